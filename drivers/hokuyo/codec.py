@@ -1,0 +1,1 @@
+"""SCIP frames: bytes in, events out."""

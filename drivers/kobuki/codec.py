@@ -1,0 +1,1 @@
+"""Kobuki frames: bytes in, events out."""

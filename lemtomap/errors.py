@@ -1,0 +1,33 @@
+"""What can go wrong in LEMTOMap, split by what the caller must do.
+
+LemtomapError
+├── BadInput      a file or a setting is unusable: tell the user its name, the place and the reason
+│   ├── BadLog       a recorded log
+│   ├── BadMap       a map file: foreign, truncated, of a newer schema
+│   └── BadSetting   a configuration that cannot work
+└── NoRoute       the goal cannot be reached: report, take the next goal
+"""
+
+
+class LemtomapError(Exception):
+    """Root of the tree."""
+
+
+class BadInput(LemtomapError):
+    """Something the user gave cannot be used; the text is one line that says what and where."""
+
+
+class BadLog(BadInput):
+    """A recorded log cannot be read; the text names file, line and reason."""
+
+
+class BadMap(BadInput):
+    """A map file cannot be used; the text names the file and the reason."""
+
+
+class BadSetting(BadInput):
+    """A setting cannot work; the text names it and its limits."""
+
+
+class NoRoute(LemtomapError):
+    """There is no way to the goal; the text says why."""

@@ -1,0 +1,1 @@
+"""Jitted functions of the rolling window on plain arrays."""

@@ -1,0 +1,1 @@
+"""Jitted functions of navigation on plain arrays."""

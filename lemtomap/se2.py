@@ -1,0 +1,76 @@
+"""Poses in the plane, SE(2), as float64 arrays whose last axis is [x m, y m, yaw rad].
+
+`T_a_b` is the pose of frame b in frame a; in a product the middle letters cancel:
+`T_a_c = compose(T_a_b, T_b_c)` (thesis, section 3-2, equations 3-1 to 3-5). All functions broadcast
+over leading axes and never change their arguments.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Pose = NDArray[np.float64]
+"""float64 (..., 3): x m, y m, yaw rad."""
+
+IDENTITY: Pose = np.zeros(3)
+IDENTITY.setflags(write=False)
+
+
+def pose(x_m: float, y_m: float, yaw_rad: float) -> Pose:
+    """Return one pose, float64 (3,)."""
+    return np.array([x_m, y_m, yaw_rad], dtype=np.float64)
+
+
+def wrap_angle(angle_rad: ArrayLike) -> NDArray[np.float64]:
+    """Return the same angle in [-pi, pi)."""
+    angle = np.asarray(angle_rad, dtype=np.float64)
+    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def compose(T_a_b: ArrayLike, T_b_c: ArrayLike) -> Pose:
+    """Return T_a_c, yaw in [-pi, pi)."""
+    a, b = np.asarray(T_a_b, dtype=np.float64), np.asarray(T_b_c, dtype=np.float64)
+    cos, sin = np.cos(a[..., 2]), np.sin(a[..., 2])
+    x = a[..., 0] + cos * b[..., 0] - sin * b[..., 1]
+    y = a[..., 1] + sin * b[..., 0] + cos * b[..., 1]
+    return np.stack([x, y, wrap_angle(a[..., 2] + b[..., 2])], axis=-1)
+
+
+def inverse(T_a_b: ArrayLike) -> Pose:
+    """Return T_b_a."""
+    a = np.asarray(T_a_b, dtype=np.float64)
+    cos, sin = np.cos(a[..., 2]), np.sin(a[..., 2])
+    x = -cos * a[..., 0] - sin * a[..., 1]
+    y = sin * a[..., 0] - cos * a[..., 1]
+    return np.stack([x, y, wrap_angle(-a[..., 2])], axis=-1)
+
+
+def between(T_w_a: ArrayLike, T_w_b: ArrayLike) -> Pose:
+    """Return T_a_b from two poses in one frame. Holds: between(a, a) == identity."""
+    return compose(inverse(T_w_a), T_w_b)
+
+
+def transform(T_a_b: ArrayLike, points_b: ArrayLike) -> NDArray[np.float64]:
+    """Return points_a, float64 (..., 2), metres, of points_b by one pose (3,)."""
+    a, points = np.asarray(T_a_b, dtype=np.float64), np.asarray(points_b, dtype=np.float64)
+    cos, sin = np.cos(a[2]), np.sin(a[2])
+    x = a[0] + cos * points[..., 0] - sin * points[..., 1]
+    y = a[1] + sin * points[..., 0] + cos * points[..., 1]
+    return np.stack([x, y], axis=-1)
+
+
+def adjoint(T_a_b: ArrayLike) -> NDArray[np.float64]:
+    """Return the 3x3 matrix that carries a small motion written in b into a (both [dx, dy, dyaw])."""
+    x, y, yaw = np.asarray(T_a_b, dtype=np.float64)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.array([[cos, -sin, y], [sin, cos, -x], [0.0, 0.0, 1.0]])
+
+
+def interpolate(T_w_a: ArrayLike, T_w_b: ArrayLike, share: ArrayLike) -> Pose:
+    """Return the pose at `share` (0 at a, 1 at b) of the way, turning the short way round."""
+    a, b = np.asarray(T_w_a, dtype=np.float64), np.asarray(T_w_b, dtype=np.float64)
+    s = np.asarray(share, dtype=np.float64)
+    delta = b - a
+    delta[..., 2] = wrap_angle(delta[..., 2])
+    result = a + s[..., None] * delta
+    result[..., 2] = wrap_angle(result[..., 2])
+    return result

@@ -1,0 +1,147 @@
+"""What the parts of LEMTOMap hand to one another: frozen samples and snapshots, SI units.
+
+Frames: `base` (robot, x forward, y left), `laser`, `odom` (continuous, drifts), `grid` (the rolling
+window's frame), `node/<id>` (each topological node owns one). There is no world frame.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Where the wheels (and gyro) say the base is."""
+
+    stamp_s: float
+    T_odom_base: Pose
+    v_mps: float = 0.0
+    w_radps: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """One turn of a planar laser. Beam i points to angle_min + i * angle_step at stamp + i * time_step."""
+
+    stamp_s: float
+    """Time of the first beam."""
+    ranges_m: NDArray[np.float32]
+    """float32 (N,), REP-117: NaN invalid, +inf nothing seen."""
+    angle_min_rad: float
+    angle_step_rad: float
+    time_step_s: float = 0.0
+    range_min_m: float = 0.02
+    range_max_m: float = 5.6
+    T_base_laser: Pose = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """Velocity of the base in its own frame."""
+
+    v_mps: float = 0.0
+    w_radps: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class GridView:
+    """Immutable snapshot of the best particle's window."""
+
+    stamp_s: float
+    occupancy: NDArray[np.int8]
+    """int8 (rows, cols), read-only, C order; -1 unknown, else 0..100; [0, 0] is the cell of least x and y,
+    rows grow with y."""
+    resolution_m: float
+    origin_m: tuple[float, float]
+    """Lower-left corner of cell [0, 0], in the grid frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class SlamUpdate:
+    """What one scan told the rolling-window SLAM."""
+
+    stamp_s: float
+    T_grid_base: Pose
+    T_grid_odom: Pose
+    """Published correction, spread over time: T_grid_base == compose(T_grid_odom, T_odom_base) up to the part
+    still being spread."""
+    covariance: NDArray[np.float64]
+    """float64 (3, 3) of this update's T_grid_base *relative to the window*, axes of grid: m, m, rad."""
+    step_covariance: NDArray[np.float64]
+    """float64 (3, 3) of the motion since the previous update, in the previous base frame: what a
+    topological odometry edge accumulates."""
+    quality: float
+    """0 (scan and window disagree) to 1 (every beam explained)."""
+    diversity: float
+    """mu of Appendix D: 0 in a featureless corridor, 1 where surfaces face all ways."""
+    matched: bool
+    """False: the match was refused or there was nothing to match; the pose follows odometry."""
+    integrated: bool
+    """True: the scan went into the window."""
+    jumped: bool = False
+    """True: T_grid_odom moved by more than the smooth limit on purpose (relocalisation)."""
+
+
+class EdgeType(StrEnum):
+    """Why an edge is believed (thesis, section 3-3-1)."""
+
+    ODOMETRY = "odometry"
+    NEAR_NEIGHBOUR = "near_neighbour"
+    LOOP_CLOSING = "loop_closing"
+
+
+@dataclass(frozen=True, slots=True)
+class RouteEdge:
+    """What a planner needs of an edge, seen from one of its ends."""
+
+    edge_id: int
+    other_id: int
+    length_m: float
+    time_s: float
+    """Expected traversal time: learnt where driven, else length over a usual speed."""
+    blocked_until_s: float = 0.0
+    """The edge is closed to planning while now_s is below this."""
+
+
+class RouteGraph(Protocol):
+    """The topological map as a planner sees it; also of maps far larger than memory."""
+
+    @property
+    def version(self) -> int:
+        """Changes whenever an edge appears, goes, or changes its cost or blocking."""
+        ...
+
+    def has_node(self, node_id: int) -> bool:
+        """Tell whether the map knows this node."""
+        ...
+
+    def edges_of(self, node_id: int) -> Sequence[RouteEdge]:
+        """Return the edges at a node, blocked ones too; empty for an unknown node."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class MapView:
+    """What mapping tells navigation and viewers: one immutable snapshot."""
+
+    stamp_s: float
+    grid: GridView
+    T_grid_odom: Pose
+    T_grid_base: Pose
+    associated_id: int
+    T_grid_node: Mapping[int, Pose]
+    """Nodes near the associated node, from local graph solving and the local grid map transform."""
+    edges: Sequence[tuple[int, int, int, EdgeType]]
+    """(edge id, node a, node b, type) among those nodes, for pictures."""
+    quality: float
+    diversity: float
+    lost: bool
+    particles: NDArray[np.float64] | None = None
+    """float64 (N, 3), T_grid_base of each particle."""
+    names: Mapping[int, str] = field(default_factory=dict)
