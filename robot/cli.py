@@ -1,0 +1,86 @@
+"""The `lemtomap` command: what a person types, and the one line they read when it cannot be done.
+
+Exit codes: 0 done, 1 a fault of ours or a failed check, 2 unusable input or device, 130 interrupted.
+"""
+
+import contextlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import typer
+
+from drivers.errors import DriverError
+from lemtomap.errors import LemtomapError
+from robot import cli_drive, cli_map
+
+DEBUG_VARIABLE = "LEMTOMAP_DEBUG"  # set: show the traceback of an unexpected error
+
+app = typer.Typer(
+    name="lemtomap",
+    help=(
+        "Map a building with a TurtleBot 2 and send it to places by name.\n\n"
+        "\b\n"
+        "lemtomap sim                              the whole robot in simulation, no hardware needed\n"
+        "lemtomap run --map office.lemto           the real robot on two USB cables\n"
+        "lemtomap map intel.clf --out out/intel    a recorded log\n"
+        "lemtomap doctor                           what is missing, and its cure"
+    ),
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.callback()
+def _program() -> None:
+    """Keep subcommands even while there is only one."""
+
+
+cli_drive.register(app)
+cli_map.register(app)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; when it goes wrong the user reads one line, no traceback."""
+    try:
+        result = app(
+            args=list(sys.argv[1:] if arguments is None else arguments),
+            prog_name="lemtomap",
+            standalone_mode=False,
+        )
+    except typer.TyperException as error:
+        return _usage(error)
+    except (LemtomapError, DriverError) as error:
+        return _fail(2, str(error))
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        return _fail(2, f"{place}{error.strerror or error}")
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail(130, "interrupted")
+    except Exception as error:  # noqa: BLE001 - the user gets one line, whatever it is
+        if os.environ.get(DEBUG_VARIABLE):
+            traceback.print_exc()
+        return _fail(1, f"unexpected {type(error).__name__}: {error} ({DEBUG_VARIABLE}=1 shows where)")
+    return result if isinstance(result, int) else 0
+
+
+def _usage(error: typer.TyperException) -> int:
+    """Say in one line what is wrong with the options; the bare command shows its help instead."""
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "lemtomap"
+    text = error.format_message()
+    if "\n" in text:
+        sys.stdout.write(text + "\n")
+        return 2
+    return _fail(2, f"{text.rstrip('.')} (see '{command} --help')")
+
+
+def _fail(code: int, text: str) -> int:
+    """Write one line to stderr."""
+    line = " ".join(text.split())
+    with contextlib.suppress(BrokenPipeError):
+        sys.stderr.write(f"lemtomap: {line}\n")
+    return code

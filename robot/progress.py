@@ -1,0 +1,50 @@
+"""A progress bar for long work: share, rate, speed against real time, time left; silent on no terminal."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+
+@dataclass(slots=True)
+class Bar:
+    """What the work tells the bar."""
+
+    _progress: Progress
+    _task: TaskID
+    _unit: str
+
+    def show(self, share: float, count: int = 0, speed: float | None = None) -> None:
+        """Move to `share` (0..1) with `count` units done; `speed` is how many times faster than real time."""
+        elapsed_s = self._progress.tasks[self._task].elapsed or 0.0
+        rate = f"{count / elapsed_s:,.0f} {self._unit}/s" if count and elapsed_s > 0.5 else ""
+        faster = f"{speed:.1f}x real time" if speed else ""
+        self._progress.update(self._task, completed=share, rate=rate, faster=faster)
+
+    def say(self, text: str) -> None:
+        """Print a line above the bar."""
+        self._progress.console.print(text, highlight=False, markup=False)
+
+
+@contextmanager
+def progress_bar(title: str, unit: str = "scans") -> Iterator[Bar]:
+    """Show a bar on stderr while the body runs; on no terminal only the lines said are printed."""
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=30),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TextColumn("{task.fields[faster]}"),
+        TimeRemainingColumn(compact=True),
+        TextColumn("left"),
+    )
+    shown = sys.stderr.isatty()
+    with Progress(
+        *columns, console=console, transient=True, disable=not shown, refresh_per_second=5
+    ) as progress:
+        task = progress.add_task(title, total=1.0, rate="", faster="")
+        yield Bar(progress, task, unit)
