@@ -1,0 +1,37 @@
+"""Settings of the topological map, each with its unit and source."""
+
+from dataclasses import dataclass
+
+from lemtomap.errors import BadSetting
+
+
+@dataclass(frozen=True, slots=True)
+class TopoConfig:
+    """Defaults hold for every building; a bad value is refused."""
+
+    new_node_distance_m: float = 1.0  # thesis section 3-3-2; ros_lemtomap A.3 new_node_distance
+    association_margin_m: float = 0.1  # a neighbour must be nearer by this: no flicker half-way between two
+    local_radius_m: float = 25.0  # local solve and D_nn, thesis section 3-3-2: the same; a window across
+    local_limit: int = 400  # nodes in a local solve at most, nearest first: bounds the step in dense maps
+    near_neighbour_max_m: float = 4.0  # ros_lemtomap A.3: the next node always lies well inside the window
+    near_neighbour_gain: float = (
+        0.02  # an edge must shorten the way between its ends by this share (Fig. 3-9)
+    )
+    robot_radius_m: float = 0.18  # Kobuki's body, 351.5 mm across
+    occupied_from: int = 50  # occupancy of GridView that stops the robot
+    max_step_deviation_m: float = 0.5  # a larger jump of the SLAM pose between two scans is no motion
+    place_radius_m: float = 5.0  # half the window less the distance at which data is taken
+    place_taken_at_m: float = 3.5  # with the radius: still whole in a 20 m window, surroundings all seen
+    commit_every_s: float = 0.5  # design section 7: at most a second is lost
+    paged_nodes: int = 4096  # nodes kept in memory, a few hundred bytes each
+    durable: bool = True  # sync to disk with each commit; batch runs over a log need not
+
+    def __post_init__(self) -> None:
+        if self.new_node_distance_m <= 0.0:
+            raise BadSetting(f"new_node_distance_m must be above 0, is {self.new_node_distance_m}")
+        if not 0.0 <= self.association_margin_m < self.new_node_distance_m:
+            raise BadSetting("association_margin_m must be at least 0 and below new_node_distance_m")
+        if self.local_radius_m < self.near_neighbour_max_m:
+            raise BadSetting("local_radius_m must not be below near_neighbour_max_m")
+        if self.paged_nodes < 2 * self.local_limit:
+            raise BadSetting("paged_nodes must be at least twice local_limit")

@@ -1,0 +1,137 @@
+"""The topological map's two nouns (thesis, section 3-3-1). A node has no pose; only edges relate places.
+
+An edge's covariance is that of a small motion of the target in its *own* axes (right perturbation, as in
+g2o and gtsam): the true relative pose is compose(T_source_target, xi), xi ~ N(0, covariance).
+"""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose, adjoint, inverse
+from lemtomap.types import EdgeType
+
+Covariance = NDArray[np.float64]
+"""float64 (3, 3): m, m, rad, symmetric and positive definite."""
+
+USUAL_SPEED_MPS = 0.4  # expected speed on an edge nobody has driven yet; half of Kobuki's 0.7 m/s and a bit
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A place: an identity that is never used again, the area and level it is on, and how to recognise it."""
+
+    node_id: int
+    area_id: int = 1
+    level: int = 0
+    created_s: float = 0.0
+    visits: int = 1
+    """How often the robot associated with this node; long-term operation prunes and ages by it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A node's localisation data: the obstacle boundary in the node's frame, coded, and its descriptor."""
+
+    taken_s: float
+    boundary: bytes
+    descriptor: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A measured relation between two nodes. Its identity is never used again."""
+
+    edge_id: int
+    source_id: int
+    target_id: int
+    T_source_target: Pose
+    covariance: Covariance
+    type: EdgeType
+    share: float = 1.0
+    """0..1: how much of the covariance's information no other edge already holds. Near-neighbour edges
+    read off the same window as the odometry edges beside them tell nothing new (0): they serve routes."""
+    time_s: float | None = None
+    """Learnt traversal time; None where no one has driven yet."""
+    blocked_until_s: float = 0.0
+
+    @property
+    def length_m(self) -> float:
+        """Length of the straight line between the ends (thesis: the edge's cost)."""
+        return float(np.hypot(self.T_source_target[0], self.T_source_target[1]))
+
+    @property
+    def expected_time_s(self) -> float:
+        """Learnt traversal time, else length over the usual speed."""
+        return self.length_m / USUAL_SPEED_MPS if self.time_s is None else self.time_s
+
+    def other(self, node_id: int) -> int:
+        """Return the end that is not `node_id`."""
+        return self.target_id if node_id == self.source_id else self.source_id
+
+    def seen_from(self, node_id: int) -> Pose:
+        """Return the pose of the other end in this end's frame, float64 (3,)."""
+        if node_id == self.source_id:
+            return self.T_source_target
+        return inverse(self.T_source_target)
+
+    def covariance_from(self, node_id: int) -> Covariance:
+        """Return the covariance of `seen_from(node_id)`, in the axes of the other end."""
+        if node_id == self.source_id:
+            return self.covariance
+        turn = adjoint(self.T_source_target)
+        return turn @ self.covariance @ turn.T
+
+
+class OpeningState(StrEnum):
+    """What became of an unexplored opening (thesis, section 7-2: placeholders)."""
+
+    OPEN = "open"
+    EXPLORED = "explored"
+    CLOSED = "closed"
+
+
+@dataclass(frozen=True, slots=True)
+class Placeholder:
+    """An opening towards unexplored space, remembered after the window forgot it; in its node's frame."""
+
+    placeholder_id: int
+    node_id: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    width_m: float = 0.0
+    state: OpeningState = OpeningState.OPEN
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something felt rather than seen (a bump, a cliff), in its node's frame."""
+
+    mark_id: int
+    node_id: int
+    kind: str
+    x_m: float
+    y_m: float
+    stamp_s: float
+
+
+def chain_covariance(first: Covariance, T_b_c: Pose, second: Covariance) -> Covariance:
+    """Return the covariance of compose(T_a_b, T_b_c) in axes of c from those of its two parts.
+
+    Independent parts, first order (Smith, Self and Cheeseman 1990).
+    """
+    carry = adjoint(inverse(T_b_c))
+    return np.asarray(carry @ first @ carry.T + second)
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """A room or corridor: nodes with the same area ID belong to it."""
+
+    area_id: int
+    name: str = ""
+    kind: str = ""
+    tags: tuple[str, ...] = field(default=())

@@ -1,0 +1,74 @@
+"""The robot-centric map: where the nodes near the associated node lie in the window's frame.
+
+A node is *anchored* while the window still holds what was around it when its pose in the window was
+measured (at its birth, or by a match of its localisation data). The rest follow from the edges. Nothing here
+is ever stored: it is the window's view of the graph, gone with the window.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lemtomap.se2 import Pose, compose
+from lemtomap.topo.graph import Covariance, chain_covariance
+from lemtomap.topo.paging import PagedGraph, Reached
+from lemtomap.types import GridView
+
+EDGE_MARGIN_M = 1.0  # a node nearer to the window's border than this has lost its surroundings
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Where a node stands in the window."""
+
+    T_grid_node: Pose
+    covariance: Covariance
+    """float64 (3, 3), relative to the window, axes of the node."""
+    anchored: bool
+    """Measured in this window, rather than predicted by the graph."""
+
+
+class LocalMap:
+    """Poses of nearby nodes in the grid frame, anchored at the associated node."""
+
+    def __init__(self, graph: PagedGraph, radius_m: float, limit: int) -> None:
+        self._graph = graph
+        self._radius_m = radius_m
+        self._limit = limit
+        self.standings: dict[int, Standing] = {}
+        self.reached: dict[int, Reached] = {}
+
+    def anchor(self, node_id: int, T_grid_node: Pose, covariance: Covariance) -> None:
+        """Set a node's pose as measured in this window."""
+        self.standings[node_id] = Standing(T_grid_node, covariance, anchored=True)
+
+    def release_forgotten(self, grid: GridView) -> None:
+        """Let go of nodes whose surroundings the window has forgotten."""
+        rows, cols = grid.occupancy.shape
+        low = np.array(grid.origin_m) + EDGE_MARGIN_M
+        high = np.array(grid.origin_m) + np.array([cols, rows]) * grid.resolution_m - EDGE_MARGIN_M
+        for node_id, standing in self.standings.items():
+            if not standing.anchored:
+                continue
+            x, y = standing.T_grid_node[0], standing.T_grid_node[1]
+            if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
+                self.standings[node_id] = replace(standing, anchored=False)
+
+    def settle(self, associated_id: int) -> None:
+        """Find all nodes within the local radius again and place those that are not anchored by the edges.
+
+        The associated node must stand already. Holds: afterwards `standings` has exactly the nodes reached.
+        """
+        self.reached = self._graph.reach(associated_id, self._radius_m, self._limit)
+        settled: dict[int, Standing] = {}
+        for node_id, reached in self.reached.items():
+            known = self.standings.get(node_id)
+            if known is not None and (known.anchored or reached.via is None):
+                settled[node_id] = known
+            elif reached.via is not None:
+                from_id = reached.via.other(node_id)
+                before = settled[from_id]
+                step = reached.via.seen_from(from_id)
+                covariance = chain_covariance(before.covariance, step, reached.via.covariance_from(from_id))
+                settled[node_id] = Standing(compose(before.T_grid_node, step), covariance, anchored=False)
+        self.standings = settled

@@ -1,0 +1,105 @@
+"""Near-neighbour edges: to every place that can be driven to in a straight line (thesis, section 3-3-2)."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from lemtomap.se2 import between
+from lemtomap.topo import kernels
+from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.graph import Covariance, Edge, chain_covariance
+from lemtomap.topo.local import LocalMap, Standing
+from lemtomap.topo.paging import PagedGraph, Reached
+from lemtomap.types import EdgeType, GridView
+
+
+class NeighbourFinder:
+    """Decides which near-neighbour edges a new node gets."""
+
+    def __init__(self, config: TopoConfig) -> None:
+        self._config = config
+
+    def edges_for(self, node_id: int, graph: PagedGraph, local: LocalMap, grid: GridView) -> Iterator[Edge]:
+        """Iterate over the near-neighbour edges of a node, nearest first; the caller adds each at once.
+
+        A candidate lies within the local radius (D_nn) over edges and stands in the window by measurement,
+        is on the same level and directly navigable, and the edge shortens the way to it.
+        """
+        level = graph.node(node_id).level
+        here = local.standings[node_id]
+        for other_id, line_m in self._candidates(node_id, local):
+            there = local.standings[other_id]
+            if graph.node(other_id).level != level or graph.edge_between(node_id, other_id) is not None:
+                continue
+            if not self._shortens(node_id, other_id, line_m, graph, local.reached):
+                continue
+            if directly_navigable(grid, here, there, self._config):
+                yield self._edge(node_id, other_id, local)
+
+    def _candidates(self, node_id: int, local: LocalMap) -> list[tuple[int, float]]:
+        x, y = local.standings[node_id].T_grid_node[:2]
+        found = []
+        for other_id, standing in local.standings.items():
+            line_m = float(np.hypot(standing.T_grid_node[0] - x, standing.T_grid_node[1] - y))
+            if other_id != node_id and standing.anchored and line_m <= self._config.near_neighbour_max_m:
+                found.append((other_id, line_m))
+        return sorted(found, key=lambda candidate: (candidate[1], candidate[0]))
+
+    def _shortens(
+        self, node_id: int, other_id: int, line_m: float, graph: PagedGraph, reached: dict[int, Reached]
+    ) -> bool:
+        """Tell whether the straight line beats the way over edges, those just added included."""
+        way_m = reached[other_id].distance_m
+        for edge in graph.edges_of(node_id):
+            onward = graph.edge_between(edge.other(node_id), other_id)
+            if onward is not None:
+                way_m = min(way_m, edge.length_m + onward.length_m)
+        return way_m > (1.0 + self._config.near_neighbour_gain) * line_m
+
+    def _edge(self, node_id: int, other_id: int, local: LocalMap) -> Edge:
+        here, there = local.standings[node_id], local.standings[other_id]
+        T_node_other = between(here.T_grid_node, there.T_grid_node)
+        covariance = chain_covariance(here.covariance, T_node_other, there.covariance)
+        share = independent_share(covariance, _chain(other_id, local.reached))
+        return Edge(0, node_id, other_id, T_node_other, covariance, EdgeType.NEAR_NEIGHBOUR, share)
+
+
+def directly_navigable(grid: GridView, a: Standing, b: Standing, config: TopoConfig) -> bool:
+    """Tell whether the robot can go straight between two places in the window; unknown cells say no."""
+    x, y = grid.origin_m
+    start, end = a.T_grid_node, b.T_grid_node
+    return bool(
+        kernels.line_is_navigable(
+            grid.occupancy,
+            grid.resolution_m,
+            start[0] - x,
+            start[1] - y,
+            end[0] - x,
+            end[1] - y,
+            config.robot_radius_m,
+            config.occupied_from,
+        )
+    )
+
+
+def independent_share(measured: Covariance, chain: Covariance) -> float:
+    """Return how much of a window measurement the edges between its ends do not already hold, 0..1.
+
+    Both come from the same matches, so only information beyond the chain's may count: the largest s with
+    s * measured^-1 <= measured^-1 - chain^-1.
+    """
+    worst = float(np.max(np.real(np.linalg.eigvals(np.linalg.solve(chain, measured)))))
+    return min(1.0, max(0.0, 1.0 - worst))
+
+
+def _chain(node_id: int, reached: dict[int, Reached]) -> Covariance:
+    """Return the covariance of a reached node relative to the start of the search, along the way there."""
+    way: list[Edge] = []
+    while (via := reached[node_id].via) is not None:
+        way.append(via)
+        node_id = via.other(node_id)
+    covariance = np.zeros((3, 3))
+    for edge in reversed(way):
+        covariance = chain_covariance(covariance, edge.seen_from(node_id), edge.covariance_from(node_id))
+        node_id = edge.other(node_id)
+    return covariance

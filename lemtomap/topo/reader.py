@@ -1,0 +1,98 @@
+"""The map as the navigation thread sees it: its own read-only connection, always the last committed state."""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Self
+
+from lemtomap.topo import schema
+from lemtomap.topo.graph import USUAL_SPEED_MPS
+from lemtomap.topo.rows import planar_length_m
+from lemtomap.types import RouteEdge
+
+_NEIGHBOURS = (
+    "SELECT id, target, time, blocked, measure FROM edge WHERE source = ?1 "
+    "UNION ALL SELECT id, source, time, blocked, measure FROM edge WHERE target = ?1"
+)
+CACHED_NODES = (
+    200_000  # some 500 bytes each: at most about 100 MB, reached only by planning across such a map
+)
+
+
+class TopoReader:
+    """A RouteGraph over a map file that another connection may be writing."""
+
+    def __init__(self, path: Path | str, *, cached_nodes: int = CACHED_NODES) -> None:
+        self.path = Path(path)
+        schema.check_file(self.path)
+        self._db = schema.connect_readonly(self.path)
+        self._cached_nodes = cached_nodes
+        self._edges: OrderedDict[int, Sequence[RouteEdge]] = OrderedDict()
+        self._seen_data_version = -1
+        self._version = 0
+
+    @property
+    def version(self) -> int:
+        """Changes whenever an edge appears, goes, or changes its cost or blocking; cheap to ask."""
+        with schema.guarded(self.path):
+            (data_version,) = self._db.execute("PRAGMA data_version").fetchone()
+            if data_version != self._seen_data_version:
+                self._seen_data_version = data_version
+                self._follow()
+        return self._version
+
+    def _follow(self) -> None:
+        """Forget what changed since the version seen last: a few nodes, or all after a long absence."""
+        oldest, newest = self._db.execute(
+            "SELECT coalesce(min(version), 0), coalesce(max(version), 0) FROM change"
+        ).fetchone()
+        if newest == self._version:
+            return
+        if oldest > self._version + 1:
+            self._edges.clear()
+        else:
+            changed = self._db.execute("SELECT node FROM change WHERE version > ?", (self._version,))
+            for (node_id,) in changed:
+                self._edges.pop(node_id, None)
+        self._version = newest
+
+    def has_node(self, node_id: int) -> bool:
+        """Tell whether the map knows this node."""
+        with schema.guarded(self.path):
+            return self._db.execute("SELECT 1 FROM node WHERE id = ?", (node_id,)).fetchone() is not None
+
+    def edges_of(self, node_id: int) -> Sequence[RouteEdge]:
+        """Return the edges at a node, blocked ones too; empty for an unknown node."""
+        edges = self._edges.get(node_id)
+        if edges is None:
+            edges = self._read(node_id)
+            self._edges[node_id] = edges
+            if len(self._edges) > self._cached_nodes:
+                self._edges.popitem(last=False)
+        return edges
+
+    def _read(self, node_id: int) -> Sequence[RouteEdge]:
+        with schema.guarded(self.path):
+            rows = self._db.execute(_NEIGHBOURS, (node_id,)).fetchall()
+        edges = []
+        for edge_id, other_id, time_s, blocked_s, measure in rows:
+            length_m = planar_length_m(measure)
+            expected_s = length_m / USUAL_SPEED_MPS if time_s is None else time_s
+            edges.append(RouteEdge(edge_id, other_id, length_m, expected_s, blocked_s or 0.0))
+        return tuple(edges)
+
+    def node_of(self, name: str) -> int | None:
+        """Return the node that bears this name."""
+        with schema.guarded(self.path):
+            row = self._db.execute("SELECT node FROM name WHERE name = ?", (name,)).fetchone()
+        return None if row is None else int(row[0])
+
+    def close(self) -> None:
+        """Close the connection; the file is untouched."""
+        self._db.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,83 @@
+"""Rows of the map file ⇄ nodes and edges."""
+
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lemtomap.topo.graph import Covariance, Edge, Node, OpeningState, Placeholder
+from lemtomap.types import EdgeType
+
+NODE_COLUMNS = "id, area, level, created, visits"
+EDGE_COLUMNS = "id, source, target, type, share, time, blocked, measure"
+
+_MEASURE = struct.Struct("<3d6f")  # relative pose in full; covariance's upper triangle needs no more
+_UPPER = np.triu_indices(3)
+_TYPES = (EdgeType.ODOMETRY, EdgeType.NEAR_NEIGHBOUR, EdgeType.LOOP_CLOSING)
+_CODES = {kind: code for code, kind in enumerate(_TYPES)}
+_SHARE_STEPS = 255
+
+
+def node_row(node: Node) -> tuple[Any, ...]:
+    """Return the node's values in the order of NODE_COLUMNS."""
+    return (node.node_id, node.area_id, node.level, node.created_s, node.visits)
+
+
+def node_from(row: Sequence[Any]) -> Node:
+    """Return the node of a row in the order of NODE_COLUMNS."""
+    return Node(*row)
+
+
+def edge_row(edge: Edge) -> tuple[Any, ...]:
+    """Return the edge's values in the order of EDGE_COLUMNS."""
+    measure = _MEASURE.pack(*edge.T_source_target, *edge.covariance[_UPPER])
+    return (
+        edge.edge_id,
+        edge.source_id,
+        edge.target_id,
+        _CODES[edge.type],
+        round(edge.share * _SHARE_STEPS),
+        edge.time_s,
+        edge.blocked_until_s or None,
+        measure,
+    )
+
+
+def edge_from(row: Sequence[Any]) -> Edge:
+    """Return the edge of a row in the order of EDGE_COLUMNS."""
+    edge_id, source, target, code, share, time_s, blocked_s, measure = row
+    values = _MEASURE.unpack(measure)
+    return Edge(
+        edge_id,
+        source,
+        target,
+        np.array(values[:3]),
+        _symmetric(values[3:]),
+        _TYPES[code],
+        share / _SHARE_STEPS,
+        time_s,
+        blocked_s or 0.0,
+    )
+
+
+def planar_length_m(measure: bytes) -> float:
+    """Return the length of an edge from its stored measure alone (planning needs no more)."""
+    x, y = struct.unpack_from("<2d", measure)
+    return float(np.hypot(x, y))
+
+
+def placeholder_from(row: Sequence[Any]) -> Placeholder:
+    """Return the opening of a row (id, node, x, y, yaw, width, state)."""
+    number, node_id, x_m, y_m, yaw_rad, width_m, state = row
+    return Placeholder(number, node_id, x_m, y_m, yaw_rad, width_m, OpeningState(state))
+
+
+def type_code(kind: EdgeType) -> int:
+    """Return the number that stands for this type in the file."""
+    return _CODES[kind]
+
+
+def _symmetric(upper: Sequence[float]) -> Covariance:
+    a, b, c, d, e, f = upper
+    return np.array([[a, b, c], [b, d, e], [c, e, f]])

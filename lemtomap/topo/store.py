@@ -1,0 +1,324 @@
+"""The map file as the mapper writes it: a little at a time, safe at every moment.
+
+Writes go into one open transaction that `tick` commits at least every half second of the data's own time,
+so a power cut loses at most that; SQLite's write-ahead log keeps the file whole. One TopoStore writes; any
+number of TopoReader read the same file meanwhile.
+"""
+
+import contextlib
+import sqlite3
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Self
+
+from lemtomap.errors import BadMap
+from lemtomap.topo import schema
+from lemtomap.topo.graph import Edge, Mark, Node, Place, Placeholder
+from lemtomap.topo.rows import (
+    EDGE_COLUMNS,
+    NODE_COLUMNS,
+    edge_from,
+    edge_row,
+    node_from,
+    node_row,
+    placeholder_from,
+)
+
+KEPT_CHANGES = 8192  # a reader further behind than this reads afresh
+
+
+class TopoStore:
+    """One `.lemto` file, open for writing."""
+
+    def __init__(self, path: Path, connection: sqlite3.Connection, *, commit_every_s: float = 0.5) -> None:
+        self.path = path
+        self.commit_every_s = commit_every_s
+        self._db = connection
+        self._begun_s: float | None = None
+        self._stamp_s = 0.0
+        self._next_node = self._next_id("node")
+        self._next_edge = self._next_id("edge")
+        self.version = int(self._one("SELECT coalesce(max(version), 0) FROM change"))
+
+    @classmethod
+    def create(cls, path: Path | str, *, durable: bool = True, commit_every_s: float = 0.5) -> Self:
+        """Make a new, empty map. Raises BadMap when the path exists or cannot be written."""
+        path = Path(path)
+        if path.exists():
+            raise BadMap(f"{path}: exists already")
+        try:
+            path.touch(exist_ok=False)
+        except OSError as error:
+            raise BadMap(f"{path}: cannot be created ({error.strerror})") from None
+        try:
+            connection = schema.connect(path)
+            with schema.guarded(path):
+                connection.execute(f"PRAGMA page_size = {schema.PAGE_SIZE}")
+                connection.execute(f"PRAGMA application_id = {schema.APPLICATION_ID}")
+                connection.execute(f"PRAGMA user_version = {schema.SCHEMA_VERSION}")
+                connection.executescript(f"BEGIN;{schema.SCHEMA}COMMIT;")
+        except BadMap:
+            path.unlink(missing_ok=True)
+            raise
+        return cls._prepared(path, connection, durable=durable, commit_every_s=commit_every_s)
+
+    @classmethod
+    def open(cls, path: Path | str, *, durable: bool = True, commit_every_s: float = 0.5) -> Self:
+        """Open a map to go on with it. Raises BadMap for anything that is not a whole map of our schema."""
+        path = Path(path)
+        schema.check_file(path)
+        connection = schema.connect(path)
+        try:
+            schema.check_content(path, connection)
+            return cls._prepared(path, connection, durable=durable, commit_every_s=commit_every_s)
+        except BadMap:
+            connection.close()
+            raise
+
+    @classmethod
+    def _prepared(
+        cls, path: Path, connection: sqlite3.Connection, *, durable: bool, commit_every_s: float
+    ) -> Self:
+        with schema.guarded(path):
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute(f"PRAGMA synchronous = {'FULL' if durable else 'NORMAL'}")
+            return cls(path, connection, commit_every_s=commit_every_s)
+
+    # -- transactions ---------------------------------------------------------------------------------------
+
+    def tick(self, now_s: float) -> None:
+        """Tell the data's time; commits what has waited `commit_every_s`."""
+        self._stamp_s = now_s
+        if self._begun_s is None or not self._db.in_transaction:
+            return
+        if not 0.0 <= now_s - self._begun_s < self.commit_every_s:
+            self.commit()
+
+    def commit(self) -> None:
+        """Make everything so far safe."""
+        if self._db.in_transaction:
+            with schema.guarded(self.path):
+                self._db.execute("COMMIT")
+
+    def close(self) -> None:
+        """Commit, fold the write-ahead log into the one file, close. May be called again."""
+        with contextlib.suppress(sqlite3.ProgrammingError):
+            self._close()
+
+    def _close(self) -> None:
+        try:
+            self._write("DELETE FROM change WHERE version < ?", (self.version,))
+            self.commit()
+            with schema.guarded(self.path):
+                self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            with contextlib.suppress(
+                sqlite3.OperationalError
+            ):  # a reader holds the file: it stays in WAL mode
+                self._db.execute("PRAGMA busy_timeout = 0")
+                self._db.execute("PRAGMA journal_mode = DELETE")
+        finally:
+            self._db.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def write(self, sql: str, values: Iterable[Any] = ()) -> None:
+        """Run one statement inside the open transaction (edits and undo)."""
+        self._write(sql, tuple(values))
+
+    def _write(self, sql: str, values: tuple[Any, ...]) -> None:
+        with schema.guarded(self.path):
+            if not self._db.in_transaction:
+                self._db.execute("BEGIN IMMEDIATE")
+                self._begun_s = self._stamp_s
+            self._db.execute(sql, values)
+
+    def query(self, sql: str, values: Iterable[Any] = ()) -> Iterator[tuple[Any, ...]]:
+        """Iterate over the rows of a read, uncommitted writes included."""
+        with schema.guarded(self.path):
+            yield from self._db.execute(sql, tuple(values))
+
+    def _one(self, sql: str, values: tuple[Any, ...] = ()) -> Any:
+        with schema.guarded(self.path):
+            row = self._db.execute(sql, values).fetchone()
+        return None if row is None else row[0]
+
+    # -- nodes ----------------------------------------------------------------------------------------------
+
+    def add_node(self, *, area_id: int = 1, level: int = 0, created_s: float = 0.0) -> Node:
+        """Make a node with an ID never used before in this file."""
+        node = Node(self._next_node, area_id, level, created_s)
+        self._next_node += 1
+        self._write(f"INSERT INTO node({NODE_COLUMNS}) VALUES(?, ?, ?, ?, ?)", node_row(node))
+        return node
+
+    def node(self, node_id: int) -> Node | None:
+        """Return the node, None when the map has none of this ID."""
+        for row in self.query(f"SELECT {NODE_COLUMNS} FROM node WHERE id = ?", (node_id,)):  # noqa: S608
+            return node_from(row)
+        return None
+
+    def nodes(self) -> Iterator[Node]:
+        """Iterate over all nodes by ID; streams, so also over maps larger than memory."""
+        return (node_from(row) for row in self.query(f"SELECT {NODE_COLUMNS} FROM node ORDER BY id"))  # noqa: S608
+
+    def put_node(self, node: Node) -> None:
+        """Write a changed node."""
+        self._write(
+            "UPDATE node SET area = ?, level = ?, created = ?, visits = ? WHERE id = ?",
+            (node.area_id, node.level, node.created_s, node.visits, node.node_id),
+        )
+
+    def delete_node(self, node_id: int) -> None:
+        """Remove a node with its edges, names and marks. Its ID stays used for ever."""
+        for edge in self.edges_of(node_id):
+            self.delete_edge(edge.edge_id)
+        for table in ("name", "placeholder", "mark"):
+            self._write(f"DELETE FROM {table} WHERE node = ?", (node_id,))  # noqa: S608
+        self._write("DELETE FROM node WHERE id = ?", (node_id,))
+        self.set_meta("next_node", self._next_node)
+
+    def place(self, node_id: int) -> Place | None:
+        """Return a node's localisation data, None when it has none yet."""
+        sql = "SELECT taken, boundary, descriptor FROM node WHERE id = ? AND boundary IS NOT NULL"
+        for taken_s, boundary, descriptor in self.query(sql, (node_id,)):
+            return Place(taken_s, boundary, descriptor or b"")
+        return None
+
+    def put_place(self, node_id: int, place: Place) -> None:
+        """Write a node's localisation data over what it had."""
+        self._write(
+            "UPDATE node SET taken = ?, boundary = ?, descriptor = ? WHERE id = ?",
+            (place.taken_s, place.boundary, place.descriptor or None, node_id),
+        )
+
+    def places(self, after_id: int = 0) -> Iterator[tuple[int, Place]]:
+        """Iterate over (node ID, localisation data) of all nodes beyond `after_id` that have it, by ID."""
+        sql = (
+            "SELECT id, taken, boundary, descriptor FROM node "
+            "WHERE id > ? AND boundary IS NOT NULL ORDER BY id"
+        )
+        for node_id, taken_s, boundary, descriptor in self.query(sql, (after_id,)):
+            yield node_id, Place(taken_s, boundary, descriptor or b"")
+
+    # -- edges ----------------------------------------------------------------------------------------------
+
+    def add_edge(self, edge: Edge) -> Edge:
+        """Write a new edge; returns it with an ID never used before (`edge.edge_id` is ignored)."""
+        edge = replace(edge, edge_id=self._next_edge)
+        self._next_edge += 1
+        self._write(f"INSERT INTO edge({EDGE_COLUMNS}) VALUES(?, ?, ?, ?, ?, ?, ?, ?)", edge_row(edge))
+        self._changed(edge.source_id, edge.target_id)
+        return edge
+
+    def edge(self, edge_id: int) -> Edge | None:
+        """Return the edge, None when the map has none of this ID."""
+        for row in self.query(f"SELECT {EDGE_COLUMNS} FROM edge WHERE id = ?", (edge_id,)):  # noqa: S608
+            return edge_from(row)
+        return None
+
+    def edges(self) -> Iterator[Edge]:
+        """Iterate over all edges by ID; streams."""
+        return (edge_from(row) for row in self.query(f"SELECT {EDGE_COLUMNS} FROM edge ORDER BY id"))  # noqa: S608
+
+    def edges_of(self, node_id: int) -> list[Edge]:
+        """Return the edges at a node by ID; empty for an unknown node."""
+        sql = f"SELECT {EDGE_COLUMNS} FROM edge WHERE source = ?1 UNION ALL SELECT {EDGE_COLUMNS} FROM edge WHERE target = ?1"  # noqa: E501, S608
+        return sorted((edge_from(row) for row in self.query(sql, (node_id,))), key=lambda edge: edge.edge_id)
+
+    def put_edge(self, edge: Edge) -> None:
+        """Write a changed edge over the one with its ID."""
+        sql = f"REPLACE INTO edge({EDGE_COLUMNS}) VALUES(?, ?, ?, ?, ?, ?, ?, ?)"
+        self._write(sql, edge_row(edge))
+        self._changed(edge.source_id, edge.target_id)
+
+    def delete_edge(self, edge_id: int) -> None:
+        """Remove an edge. Its ID stays used for ever."""
+        edge = self.edge(edge_id)
+        if edge is None:
+            return
+        self._write("DELETE FROM edge WHERE id = ?", (edge_id,))
+        self.set_meta("next_edge", self._next_edge)
+        self._changed(edge.source_id, edge.target_id)
+
+    def _changed(self, *node_ids: int) -> None:
+        for node_id in node_ids:
+            self.version += 1
+            self._write("INSERT INTO change(version, node) VALUES(?, ?)", (self.version, node_id))
+        if self.version % 1024 < len(node_ids):
+            self._write("DELETE FROM change WHERE version <= ?", (self.version - KEPT_CHANGES,))
+
+    def changed_everywhere(self) -> None:
+        """Tell readers to forget all they know (after undo)."""
+        self.version += KEPT_CHANGES + 1
+        self._write("DELETE FROM change", ())
+        self._write("INSERT INTO change(version, node) VALUES(?, 0)", (self.version,))
+        self._next_node = max(self._next_node, self._next_id("node"))
+        self._next_edge = max(self._next_edge, self._next_id("edge"))
+
+    # -- names, openings, marks, meta -----------------------------------------------------------------------
+
+    def names(self) -> dict[str, int]:
+        """Return all names and their nodes."""
+        return dict(self.query("SELECT name, node FROM name ORDER BY name"))
+
+    def set_name(self, name: str, node_id: int) -> None:
+        """Give a node a name; a name belongs to one node."""
+        self._write("REPLACE INTO name(name, node) VALUES(?, ?)", (name, node_id))
+
+    def add_placeholder(self, opening: Placeholder) -> Placeholder:
+        """Write an unexplored opening; returns it with its ID."""
+        number = int(self._one("SELECT coalesce(max(id), 0) + 1 FROM placeholder"))
+        opening = replace(opening, placeholder_id=number)
+        self.put_placeholder(opening)
+        return opening
+
+    def put_placeholder(self, opening: Placeholder) -> None:
+        """Write a changed opening over the one with its ID."""
+        self._write(
+            "REPLACE INTO placeholder(id, node, x, y, yaw, width, state) VALUES(?, ?, ?, ?, ?, ?, ?)",
+            (
+                opening.placeholder_id,
+                opening.node_id,
+                opening.x_m,
+                opening.y_m,
+                opening.yaw_rad,
+                opening.width_m,
+                str(opening.state),
+            ),
+        )
+
+    def placeholders(self) -> list[Placeholder]:
+        """Return all openings."""
+        rows = self.query("SELECT id, node, x, y, yaw, width, state FROM placeholder ORDER BY id")
+        return [placeholder_from(row) for row in rows]
+
+    def add_mark(self, mark: Mark) -> None:
+        """Remember something felt at a node (`mark.mark_id` is ignored)."""
+        values = (mark.node_id, mark.kind, mark.x_m, mark.y_m, mark.stamp_s)
+        self._write("INSERT INTO mark(node, kind, x, y, stamp) VALUES(?, ?, ?, ?, ?)", values)
+
+    def marks_of(self, node_id: int) -> list[Mark]:
+        """Return what was felt at a node."""
+        rows = self.query("SELECT id, node, kind, x, y, stamp FROM mark WHERE node = ?", (node_id,))
+        return [Mark(*row) for row in rows]
+
+    def meta(self, key: str) -> Any:
+        """Return a stored value, None when there is none."""
+        return self._one("SELECT value FROM meta WHERE key = ?", (key,))
+
+    def set_meta(self, key: str, value: float | str | bytes | None) -> None:
+        """Store a value by name."""
+        self._write("REPLACE INTO meta(key, value) VALUES(?, ?)", (key, value))
+
+    def count(self, table: str) -> int:
+        """Return how many rows `table` (node, edge, ...) has."""
+        return int(self._one(f"SELECT count(*) FROM {table}"))  # noqa: S608
+
+    def _next_id(self, table: str) -> int:
+        highest = int(self._one(f"SELECT coalesce(max(id), 0) FROM {table}"))  # noqa: S608
+        return max(highest + 1, int(self.meta(f"next_{table}") or 1))

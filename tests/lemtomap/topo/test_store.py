@@ -1,0 +1,181 @@
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lemtomap.errors import BadMap
+from lemtomap.topo.graph import Edge, Place
+from lemtomap.topo.reader import TopoReader
+from lemtomap.topo.store import TopoStore
+from lemtomap.types import EdgeType
+
+
+def an_edge(a, b, x=1.0, **changes):
+    values = {"edge_id": 0, "source_id": a, "target_id": b, "T_source_target": np.array([x, 0.2, 0.3])}
+    values |= {"covariance": np.diag([1e-3, 2e-3, 3e-4]), "type": EdgeType.ODOMETRY}
+    return Edge(**(values | changes))
+
+
+def test_what_is_written_is_read_again_and_the_file_is_one(tmp_path):
+    path = tmp_path / "a.lemto"
+    with TopoStore.create(path) as store:
+        a, b = store.add_node(level=2, created_s=5.0), store.add_node()
+        edge = store.add_edge(an_edge(a.node_id, b.node_id, time_s=4.5, share=0.4))
+        store.put_place(a.node_id, Place(7.0, b"boundary", b"descriptor"))
+        store.set_name("kitchen", b.node_id)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.lemto"]
+    with TopoStore.open(path) as store:
+        assert store.node(a.node_id) == a
+        again = store.edge(edge.edge_id)
+        np.testing.assert_array_equal(again.T_source_target, edge.T_source_target)
+        np.testing.assert_allclose(again.covariance, edge.covariance, rtol=1e-6)
+        assert (again.time_s, round(again.share, 2), again.type) == (4.5, 0.4, EdgeType.ODOMETRY)
+        assert store.place(a.node_id) == Place(7.0, b"boundary", b"descriptor")
+        assert store.names() == {"kitchen": b.node_id}
+
+
+def test_ids_are_never_used_again(tmp_path):
+    with TopoStore.create(tmp_path / "a.lemto") as store:
+        nodes = [store.add_node().node_id for _ in range(3)]
+        edge = store.add_edge(an_edge(nodes[1], nodes[2]))
+        store.delete_node(nodes[2])
+        assert store.edge(edge.edge_id) is None
+    with TopoStore.open(tmp_path / "a.lemto") as store:
+        assert store.add_node().node_id > nodes[2]
+        assert store.add_edge(an_edge(1, 2)).edge_id > edge.edge_id
+
+
+def damage(path, how):
+    if how == "empty":
+        path.write_bytes(b"")
+    elif how == "foreign":
+        path.write_bytes(b"\x89PNG" + bytes(2000))
+    elif how == "other sqlite":
+        path.unlink()
+        db = sqlite3.connect(path)
+        db.execute("CREATE TABLE t(a)")
+        db.commit()
+        db.close()
+    elif how == "newer":
+        db = sqlite3.connect(path)
+        db.execute("PRAGMA user_version = 99")
+        db.commit()
+        db.close()
+    elif how == "cut in header":
+        path.write_bytes(path.read_bytes()[:60])
+    elif how == "cut":
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2 + 100])
+    elif how == "overwritten":
+        data = bytearray(path.read_bytes())
+        data[1024 : len(data) - 1024] = os.urandom(len(data) - 2048)
+        path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    "how", ["empty", "foreign", "other sqlite", "newer", "cut in header", "cut", "overwritten"]
+)
+def test_a_file_that_is_no_whole_map_is_refused_in_one_line_and_left_as_it_is(tmp_path, how):
+    path = tmp_path / "a.lemto"
+    with TopoStore.create(path) as store:
+        for _ in range(200):
+            store.add_node()
+    damage(path, how)
+    before = path.read_bytes()
+    for open_it in (TopoStore.open, TopoReader):
+        with pytest.raises(BadMap, match=r"a\.lemto: ") as refusal:
+            opened = open_it(path)
+            opened.edges_of(1)
+        assert "\n" not in str(refusal.value)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["a.lemto"]
+
+
+def test_missing_present_and_unwritable_paths_are_named(tmp_path):
+    with pytest.raises(BadMap, match="no such map file"):
+        TopoStore.open(tmp_path / "none.lemto")
+    TopoStore.create(tmp_path / "a.lemto").close()
+    with pytest.raises(BadMap, match="exists already"):
+        TopoStore.create(tmp_path / "a.lemto")
+    with pytest.raises(BadMap, match="cannot be created"):
+        TopoStore.create(tmp_path / "no" / "folder" / "a.lemto")
+    with pytest.raises(BadMap, match="is a folder"):
+        TopoStore.open(tmp_path)
+
+
+def test_a_full_disk_is_one_clear_line_and_the_committed_map_stays(tmp_path):
+    path = tmp_path / "a.lemto"
+    store = TopoStore.create(path)
+    store.add_node()
+    store.commit()
+    store._db.execute("PRAGMA max_page_count = 20")
+    with pytest.raises(BadMap, match="disk is full"):
+        for _ in range(1000):
+            store.put_place(store.add_node().node_id, Place(0.0, bytes(500)))
+    store._db.close()
+    with TopoStore.open(path) as again:
+        assert again.node(1) is not None
+
+
+def test_a_reader_follows_the_writer_and_forgets_only_what_changed(tmp_path):
+    path = tmp_path / "a.lemto"
+    with TopoStore.create(path) as store:
+        for _ in range(4):
+            store.add_node()
+        first = store.add_edge(an_edge(1, 2))
+        store.add_edge(an_edge(3, 4))
+        store.commit()
+        with TopoReader(path) as reader:
+            version = reader.version
+            kept = reader.edges_of(3)
+            assert [edge.other_id for edge in reader.edges_of(1)] == [2]
+            assert reader.edges_of(99) == ()
+            assert not reader.has_node(99)
+            store.put_edge(an_edge(1, 2, edge_id=first.edge_id, blocked_until_s=30.0))
+            assert reader.version == version  # not committed yet
+            store.commit()
+            assert reader.version != version
+            assert reader.edges_of(2)[0].blocked_until_s == 30.0
+            assert reader.edges_of(3) is kept
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from lemtomap.topo.store import TopoStore
+store = TopoStore.open(Path(sys.argv[1]))
+for k in range(10**9):
+    now = k * 0.01
+    node = store.add_node(created_s=now)
+    store.tick(now)
+    print(now, flush=True)
+"""
+
+
+def test_killed_at_any_moment_the_map_opens_and_lost_at_most_a_second(tmp_path):
+    path = tmp_path / "a.lemto"
+    TopoStore.create(path).close()
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        writer = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(path)],
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=Path(__file__).parents[3],
+        )
+        assert writer.stdout is not None
+        writer.stdout.readline()
+        time.sleep(float(rng.uniform(0.0, 0.15)))
+        os.kill(writer.pid, signal.SIGKILL)
+        said_s = float(writer.stdout.read().split()[-1])
+        writer.wait()
+        writer.stdout.close()
+        with TopoStore.open(path) as store:
+            last = max(store.nodes(), key=lambda node: node.node_id)
+            assert last.created_s >= said_s - 1.0
+            store.write("UPDATE node SET created = -1")
