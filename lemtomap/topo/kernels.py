@@ -52,3 +52,18 @@ def line_is_navigable(
                 if occupancy[r, c] >= occupied_from:
                     return False
     return True
+
+
+@njit(nogil=True, cache=True)
+def line_is_clear(
+    occupancy: Cells, resolution: float, x0: float, y0: float, x1: float, y1: float, occupied_from: int
+) -> bool:
+    """Tell whether no occupied cell lies on the line; unknown cells and those outside do not block sight."""
+    rows, cols = occupancy.shape
+    steps = max(1, math.ceil(2.0 * math.hypot(x1 - x0, y1 - y0) / resolution))
+    for k in range(steps + 1):
+        col = math.floor((x0 + (x1 - x0) * k / steps) / resolution)
+        row = math.floor((y0 + (y1 - y0) * k / steps) / resolution)
+        if 0 <= row < rows and 0 <= col < cols and occupancy[row, col] >= occupied_from:
+            return False
+    return True

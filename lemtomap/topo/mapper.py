@@ -11,7 +11,7 @@ from lemtomap.se2 import Pose, adjoint, between
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.local import LocalMap, Standing
-from lemtomap.topo.neighbours import NeighbourFinder
+from lemtomap.topo.neighbours import NeighbourFinder, in_sight
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
@@ -103,28 +103,41 @@ class TopoMapper:
         self._drift = chain_covariance(self._drift, step, turn @ after.step_covariance @ turn.T)
 
     def _associate_or_create(self) -> None:
-        nearest_id, nearest_m, associated_m = self._nearest()
-        if nearest_id != self._associated_id and nearest_m < associated_m - self.config.association_margin_m:
+        """Only a neighbour or a new node can come next, and only one that no wall hides.
+
+        The thesis assumes half a metre between robot and wall, so that no node beyond one is ever nearer than
+        a metre; Kobuki goes closer, hence the look at the window.
+        """
+        near, far = self.config.association_margin_m, self.config.new_node_distance_m
+        associated_m = self._distance_m(self._associated_id)
+        nearest_id = self._nearest_neighbour(associated_m - near)
+        if nearest_id:
             self._associate(nearest_id)
-        elif min(nearest_m, associated_m) > self.config.new_node_distance_m:
+        elif associated_m > far or (associated_m > 0.5 * far and not self._sees(self._associated_id)):
             self._create()
 
-    def _nearest(self) -> tuple[int, float, float]:
-        """Return the nearest among the associated node and its neighbours, its distance, and the former's."""
-        x, y = self._require().slam.T_grid_base[:2]
-        standings = self.local.standings
-
-        def distance_m(node_id: int) -> float:
-            pose = standings[node_id].T_grid_node
-            return float(np.hypot(pose[0] - x, pose[1] - y))
-
-        associated_m = distance_m(self._associated_id)
-        nearest_id, nearest_m = self._associated_id, associated_m
+    def _nearest_neighbour(self, within_m: float) -> int:
+        """Return the nearest neighbour of the associated node in sight; 0 when none is so near."""
+        nearest_id, nearest_m = 0, within_m
         for edge in self.graph.edges_of(self._associated_id):
             other_id = edge.other(self._associated_id)
-            if other_id in standings and (other_m := distance_m(other_id)) < nearest_m:
+            if other_id not in self.local.standings:
+                continue
+            other_m = self._distance_m(other_id)
+            if other_m < nearest_m and self._sees(other_id):
                 nearest_id, nearest_m = other_id, other_m
-        return nearest_id, nearest_m, associated_m
+        return nearest_id
+
+    def _distance_m(self, node_id: int) -> float:
+        (x, y, _), (node_x, node_y, _) = self._require().slam.T_grid_base, self._pose_of(node_id)
+        return float(np.hypot(node_x - x, node_y - y))
+
+    def _sees(self, node_id: int) -> bool:
+        now = self._require()
+        return in_sight(now.grid, now.slam.T_grid_base, self._pose_of(node_id), self.config)
+
+    def _pose_of(self, node_id: int) -> Pose:
+        return self.local.standings[node_id].T_grid_node
 
     def _associate(self, node_id: int) -> None:
         """Make an existing neighbour the associated node."""

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from lemtomap.se2 import between
+from lemtomap.se2 import Pose, between
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
-from lemtomap.topo.local import LocalMap, Standing
+from lemtomap.topo.local import LocalMap
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.types import EdgeType, GridView
 
@@ -33,14 +33,14 @@ class NeighbourFinder:
                 continue
             if not self._shortens(node_id, other_id, line_m, graph, local.reached):
                 continue
-            if directly_navigable(grid, here, there, self._config):
+            if directly_navigable(grid, here.T_grid_node, there.T_grid_node, self._config):
                 yield self._edge(node_id, other_id, local)
 
     def _candidates(self, node_id: int, local: LocalMap) -> list[tuple[int, float]]:
         x, y = local.standings[node_id].T_grid_node[:2]
         found = []
         for other_id, standing in local.standings.items():
-            line_m = float(np.hypot(standing.T_grid_node[0] - x, standing.T_grid_node[1] - y))
+            line_m = round(float(np.hypot(standing.T_grid_node[0] - x, standing.T_grid_node[1] - y)), 6)
             if other_id != node_id and standing.anchored and line_m <= self._config.near_neighbour_max_m:
                 found.append((other_id, line_m))
         return sorted(found, key=lambda candidate: (candidate[1], candidate[0]))
@@ -64,22 +64,19 @@ class NeighbourFinder:
         return Edge(0, node_id, other_id, T_node_other, covariance, EdgeType.NEAR_NEIGHBOUR, share)
 
 
-def directly_navigable(grid: GridView, a: Standing, b: Standing, config: TopoConfig) -> bool:
+def directly_navigable(grid: GridView, start: Pose, end: Pose, config: TopoConfig) -> bool:
     """Tell whether the robot can go straight between two places in the window; unknown cells say no."""
     x, y = grid.origin_m
-    start, end = a.T_grid_node, b.T_grid_node
-    return bool(
-        kernels.line_is_navigable(
-            grid.occupancy,
-            grid.resolution_m,
-            start[0] - x,
-            start[1] - y,
-            end[0] - x,
-            end[1] - y,
-            config.robot_radius_m,
-            config.occupied_from,
-        )
-    )
+    line = (start[0] - x, start[1] - y, end[0] - x, end[1] - y)
+    limits = (config.robot_radius_m, config.occupied_from)
+    return bool(kernels.line_is_navigable(grid.occupancy, grid.resolution_m, *line, *limits))
+
+
+def in_sight(grid: GridView, start: Pose, end: Pose, config: TopoConfig) -> bool:
+    """Tell whether no wall stands between two places in the window."""
+    x, y = grid.origin_m
+    line = (start[0] - x, start[1] - y, end[0] - x, end[1] - y)
+    return bool(kernels.line_is_clear(grid.occupancy, grid.resolution_m, *line, config.occupied_from))
 
 
 def independent_share(measured: Covariance, chain: Covariance) -> float:

@@ -108,7 +108,7 @@ class PagedGraph:
             reached[node_id] = Reached(node_id, distance_m, via)
             for edge in self.edges_of(node_id):
                 other_id = edge.other(node_id)
-                further_m = distance_m + edge.length_m
+                further_m = round(distance_m + edge.length_m, 6)  # equal ways tie in every frame
                 if further_m <= radius_m and further_m < best.get(other_id, radius_m + 1.0):
                     best[other_id] = further_m
                     pushed += 1

@@ -1,5 +1,6 @@
 """A window SLAM of one's own making: a robot led along a line through a room, without rays or noise."""
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,8 +18,8 @@ def room(size_m=20.0, resolution_m=0.05, walls=(), origin_m=None) -> GridView:
     origin = (-size_m / 2, -size_m / 2) if origin_m is None else origin_m
     occupancy = np.zeros((cells, cells), np.int8)
     for x0, y0, x1, y1 in walls:
-        c0, c1 = (int(round((x - origin[0]) / resolution_m)) for x in (x0, x1))
-        r0, r1 = (int(round((y - origin[1]) / resolution_m)) for y in (y0, y1))
+        c0, c1 = (round((x - origin[0]) / resolution_m) for x in (x0, x1))
+        r0, r1 = (round((y - origin[1]) / resolution_m) for y in (y0, y1))
         occupancy[max(r0, 0) : r1, max(c0, 0) : c1] = 100
     occupancy.setflags(write=False)
     return GridView(0.0, occupancy, resolution_m, origin)
@@ -27,8 +28,7 @@ def room(size_m=20.0, resolution_m=0.05, walls=(), origin_m=None) -> GridView:
 def along(corners, step_m=0.1, start_s=0.0, rate_hz=5.0) -> Iterator[tuple[float, np.ndarray]]:
     """Poses along straight legs, facing ahead."""
     stamp = start_s
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
-        a, b = np.asarray(a, float), np.asarray(b, float)
+    for a, b in itertools.pairwise(np.asarray(corners, float)):
         heading = np.arctan2(*(b - a)[::-1])
         for k in range(max(1, round(np.linalg.norm(b - a) / step_m))):
             at = a + (b - a) * k * step_m / np.linalg.norm(b - a)

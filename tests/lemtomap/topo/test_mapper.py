@@ -81,7 +81,7 @@ def test_turning_and_shifting_the_grid_frame_changes_nothing(tmp_path):
     for k, shift in enumerate([pose(0, 0, 0), pose(10.0, -20.0, np.pi / 2), pose(-7.5, 2.5, np.pi)]):
         mapper = TopoMapper(TopoConfig(), TopoStore.create(tmp_path / f"{k}.lemto"))
         x, y, _ = shift
-        lead(mapper, loop, room(origin_m=(x - 10, y - 10)), shift=shift)
+        lead(mapper, loop, room(origin_m=(x - 10, y - 10)), shift=shift, step_m=0.0973)
         views.append(relative(mapper.view().T_grid_node, mapper.associated_id))
         maps.append([(e.source_id, e.target_id, e.type, *e.T_source_target) for e in mapper.store.edges()])
         mapper.close()

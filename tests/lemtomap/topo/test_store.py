@@ -89,8 +89,7 @@ def test_a_file_that_is_no_whole_map_is_refused_in_one_line_and_left_as_it_is(tm
     before = path.read_bytes()
     for open_it in (TopoStore.open, TopoReader):
         with pytest.raises(BadMap, match=r"a\.lemto: ") as refusal:
-            opened = open_it(path)
-            opened.edges_of(1)
+            open_it(path).edges_of(1)
         assert "\n" not in str(refusal.value)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["a.lemto"]
@@ -108,6 +107,11 @@ def test_missing_present_and_unwritable_paths_are_named(tmp_path):
         TopoStore.open(tmp_path)
 
 
+def fill(store):
+    for _ in range(1000):
+        store.put_place(store.add_node().node_id, Place(0.0, bytes(500)))
+
+
 def test_a_full_disk_is_one_clear_line_and_the_committed_map_stays(tmp_path):
     path = tmp_path / "a.lemto"
     store = TopoStore.create(path)
@@ -115,8 +119,7 @@ def test_a_full_disk_is_one_clear_line_and_the_committed_map_stays(tmp_path):
     store.commit()
     store._db.execute("PRAGMA max_page_count = 20")
     with pytest.raises(BadMap, match="disk is full"):
-        for _ in range(1000):
-            store.put_place(store.add_node().node_id, Place(0.0, bytes(500)))
+        fill(store)
     store._db.close()
     with TopoStore.open(path) as again:
         assert again.node(1) is not None
@@ -162,7 +165,7 @@ def test_killed_at_any_moment_the_map_opens_and_lost_at_most_a_second(tmp_path):
     TopoStore.create(path).close()
     rng = np.random.default_rng(3)
     for _ in range(5):
-        writer = subprocess.Popen(
+        writer = subprocess.Popen(  # noqa: S603 - our own program
             [sys.executable, "-c", WRITER, str(path)],
             stdout=subprocess.PIPE,
             text=True,
