@@ -1,7 +1,7 @@
 """The robot's settings: frozen dataclasses of every stage, read from one TOML file and checked.
 
 An unknown key, a value of the wrong type, a negative limit, or two ports that were swapped are refused in one
-line that names file, line and key. Nothing is repaired silently. `dump` writes what a run used beside its results.
+line that names file, line and key. Nothing is repaired silently.
 """
 
 import dataclasses
@@ -79,7 +79,7 @@ def from_mapping(data: Mapping[str, Any]) -> RobotConfig:
 
 
 def to_mapping(config: Any) -> Any:
-    """Return settings as plain nested values, for summary.json and `dump`."""
+    """Return settings as plain nested values, for summary.json."""
     if dataclasses.is_dataclass(config):
         return {f.name: to_mapping(getattr(config, f.name)) for f in dataclasses.fields(config)}
     if isinstance(config, Enum):

@@ -54,7 +54,7 @@ def find(identity: Identity, ports: ListPorts = list_ports.comports) -> str:
     if not matches:
         others = ", ".join(sorted(describe(port) for port in seen if port.vid is not None)) or "none at all"
         raise PortMissing(
-            f"no {identity.name} found (USB {identity.vid:04x}:{identity.pid:04x}); USB serial ports: {others}"
+            f"no {identity.name} found (USB {identity.vid:04x}:{identity.pid:04x}); serial ports: {others}"
         )
     link = Path(identity.link)
     if link.exists() and str(link.resolve()) in matches:
@@ -65,7 +65,7 @@ def find(identity: Identity, ports: ListPorts = list_ports.comports) -> str:
 
 
 def matches_identity(port: PortInfo, identity: Identity) -> bool:
-    """Tell whether a port shows this identity. A bare FTDI chip (0403:6001) is no Kobuki: many things have one."""
+    """Tell whether a port shows this identity; a bare FTDI chip (0403:6001) may be anything, not a Kobuki."""
     if (port.vid, port.pid) != (identity.vid, identity.pid):
         return False
     text = " ".join(part for part in (port.manufacturer, port.product, port.serial_number) if part).lower()
