@@ -1,0 +1,164 @@
+"""Draw a building: walls, doors cut into them, rooms, furniture; `build` gives the World and its truth."""
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from sim.errors import BadWorld
+from sim.raster import SPAWN_CLEARANCE_M, clearance_m, find_spawn, rasterise
+from sim.world import Box, Door, GroundTruth, Pose2, Room, Surface, World
+
+if TYPE_CHECKING:
+    from sim.movers import Mover
+
+WALL_THICKNESS_M = 0.12
+WALL_HEIGHT_M = 2.4
+DOOR_WIDTH_M = 0.95  # a usual office door, 0.90 to 1.00 m
+
+Point = tuple[float, float]
+
+
+@dataclass
+class _Wall:
+    start: Point
+    end: Point
+    thickness_m: float
+    height_m: float
+    surface: Surface
+    gaps: list[tuple[float, float]] = field(default_factory=list)
+    """Openings as (from, to) along the wall, metres from its start."""
+
+    @property
+    def length_m(self) -> float:
+        return math.dist(self.start, self.end)
+
+    def locate(self, point: Point) -> tuple[float, float]:
+        """Return (metres along, metres off) of a point."""
+        ux, uy = self.direction()
+        dx, dy = point[0] - self.start[0], point[1] - self.start[1]
+        return dx * ux + dy * uy, abs(-dx * uy + dy * ux)
+
+    def direction(self) -> Point:
+        return (self.end[0] - self.start[0]) / self.length_m, (self.end[1] - self.start[1]) / self.length_m
+
+    def at(self, along: float) -> Point:
+        ux, uy = self.direction()
+        return self.start[0] + along * ux, self.start[1] + along * uy
+
+    def pieces(self) -> list[tuple[float, float]]:
+        """Return what is left of the wall between its gaps."""
+        pieces, begin = [], 0.0
+        for low, high in sorted(self.gaps):
+            if low - begin > 0.01:
+                pieces.append((begin, low))
+            begin = max(begin, high)
+        if self.length_m - begin > 0.01:
+            pieces.append((begin, self.length_m))
+        return pieces
+
+    def boxes(self) -> list[Box]:
+        yaw = math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
+        boxes = []
+        for low, high in self.pieces():
+            x, y = self.at((low + high) / 2)
+            # outer ends reach half a thickness further, so that corners close
+            grow = sum(self.thickness_m / 4 for end in (low <= 0.0, high >= self.length_m) if end)
+            half = ((high - low) / 2 + grow, self.thickness_m / 2, self.height_m / 2)
+            shift = self.thickness_m / 4 * ((high >= self.length_m) - (low <= 0.0))
+            ux, uy = self.direction()
+            centre = (x + ux * shift, y + uy * shift, self.height_m / 2)
+            boxes.append(Box(centre, half, yaw, surface=self.surface))
+        return boxes
+
+
+class FloorPlan:
+    """A building being drawn."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.flat = True
+        self.dock: Pose2 | None = None
+        self._walls: list[_Wall] = []
+        self._boxes: list[Box] = []
+        self._rooms: list[Room] = []
+        self._doors: list[Door] = []
+        self._movers: list[Mover] = []
+
+    def wall(
+        self,
+        start: Point,
+        end: Point,
+        *,
+        thickness_m: float = WALL_THICKNESS_M,
+        height_m: float = WALL_HEIGHT_M,
+        surface: Surface = Surface.WALL,
+    ) -> None:
+        """Draw a straight wall."""
+        if math.dist(start, end) < 0.01:
+            raise BadWorld(f"{self.name}: wall at {start} has no length")
+        self._walls.append(_Wall(start, end, thickness_m, height_m, surface))
+
+    def rectangle(self, low: Point, high: Point) -> None:
+        """Draw four walls."""
+        (x0, y0), (x1, y1) = low, high
+        corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+        for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
+            self.wall(start, end)
+
+    def door(
+        self,
+        name: str,
+        at: Point,
+        rooms: tuple[str, str],
+        *,
+        width_m: float = DOOR_WIDTH_M,
+    ) -> Door:
+        """Cut a doorway into the wall through `at`. Raises BadWorld when no wall is there."""
+        for wall in self._walls:
+            along, off = wall.locate(at)
+            if off <= wall.thickness_m and width_m / 2 <= along <= wall.length_m - width_m / 2:
+                low, high = along - width_m / 2, along + width_m / 2
+                wall.gaps.append((low, high))
+                door = Door(name, (wall.at(low), wall.at(high)), rooms)
+                self._doors.append(door)
+                return door
+        raise BadWorld(f"{self.name}: door '{name}' at ({at[0]:g}, {at[1]:g}) lies in no wall")
+
+    def room(self, name: str, low: Point, high: Point, *, kind: str = "room", level: int = 0) -> None:
+        """Name a rectangle as ground truth."""
+        (x0, y0), (x1, y1) = low, high
+        self._rooms.append(Room(name, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), kind, level))
+
+    def box(self, box: Box) -> None:
+        """Put a box anywhere."""
+        self._boxes.append(box)
+
+    def mover(self, mover: "Mover") -> None:
+        """Add something that moves."""
+        self._movers.append(mover)
+
+    def build(self, spawn: Pose2 | None = None, description: str = "") -> World:
+        """Raise the walls. Raises BadWorld when the spawn pose stands in something."""
+        boxes = tuple(box for wall in self._walls for box in wall.boxes()) + tuple(self._boxes)
+        inside = spawn[:2] if spawn is not None else self._middle()
+        raster = rasterise(boxes, inside)
+        if spawn is None:
+            spawn = find_spawn(raster, self.name)
+        else:
+            row, col = raster.cell(spawn[0], spawn[1])
+            rows, cols = raster.free.shape
+            known = 0 <= row < rows and 0 <= col < cols
+            if not known or clearance_m(raster)[row, col] < SPAWN_CLEARANCE_M / 2:
+                raise BadWorld(
+                    f"{self.name}: spawn ({spawn[0]:g}, {spawn[1]:g}) overlaps a wall or furniture"
+                )
+        truth = GroundTruth(tuple(self._rooms), tuple(self._doors))
+        return World(
+            self.name, boxes, raster, spawn, truth, tuple(self._movers), self.dock, self.flat, description
+        )
+
+    def _middle(self) -> Point:
+        if not self._rooms:
+            return 0.0, 0.0
+        outline = self._rooms[0].outline
+        return sum(x for x, _ in outline) / len(outline), sum(y for _, y in outline) / len(outline)

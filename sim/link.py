@@ -1,0 +1,154 @@
+"""In-memory cables: bytes with arrival times, and the damage real cables do to them."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.errors import Unplugged
+
+MAX_WAITING = 1 << 16  # bytes a host that never reads may let pile up, as a tty buffer would
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFaults:
+    """What is wrong with one cable; all zero is a perfect one."""
+
+    lose_byte: float = 0.0
+    """Chance that a byte towards the host is lost."""
+    flip_bit: float = 0.0
+    """Chance that a byte towards the host has one bit flipped."""
+    burst_s: float = 0.0
+    """Bytes arrive only at multiples of this (an FTDI latency timer of 16 ms: 0.016)."""
+    delay_s: float = 0.0
+    """Bytes arrive later by this."""
+    jitter_s: float = 0.0
+    """Bytes arrive later by up to this, at random."""
+    unplugged: tuple[tuple[float, float], ...] = ()
+    """Times (from, to) in s of the run during which the cable is out."""
+
+
+class Link:
+    """One cable. The device side calls `deliver` and `collect`, the host side has `host`."""
+
+    def __init__(
+        self, name: str, faults: LinkFaults, rng: np.random.Generator, clock: Callable[[], float]
+    ) -> None:
+        self.name = name
+        self._faults = faults
+        self._rng = rng
+        self._clock = clock
+        self._to_host: deque[tuple[float, bytes]] = deque()
+        self._to_device: list[bytes] = []
+        self._waiting = 0
+        self._last_arrival_s = 0.0
+        self._pulled = False
+        self.dropped_bytes = 0
+        """Bytes no host ever read."""
+        self.host = HostPort(self)
+
+    @property
+    def plugged(self) -> bool:
+        """Whether bytes can flow now."""
+        now = self._clock()
+        return not self._pulled and not any(begin <= now < end for begin, end in self._faults.unplugged)
+
+    def deliver(self, data: bytes, sent_s: float) -> None:
+        """Send from the device at a time; a whole piece is dropped when the host does not read."""
+        if not data:
+            return
+        if not self.plugged or self._waiting + len(data) > MAX_WAITING:
+            self.dropped_bytes += len(data)
+            return
+        damaged = self._damage(data)
+        arrival = sent_s + self._faults.delay_s
+        if self._faults.jitter_s:
+            arrival += self._faults.jitter_s * float(self._rng.random())
+        if self._faults.burst_s:
+            arrival = float(np.ceil(arrival / self._faults.burst_s)) * self._faults.burst_s
+        self._last_arrival_s = max(arrival, self._last_arrival_s)  # bytes never overtake one another
+        self._to_host.append((self._last_arrival_s, damaged))
+        self._waiting += len(damaged)
+
+    def _damage(self, data: bytes) -> bytes:
+        faults = self._faults
+        if not faults.lose_byte and not faults.flip_bit:
+            return data
+        array = np.frombuffer(data, dtype=np.uint8).copy()
+        flipped = self._rng.random(len(array)) < faults.flip_bit
+        array[flipped] ^= (1 << self._rng.integers(0, 8, int(flipped.sum()))).astype(np.uint8)
+        return array[self._rng.random(len(array)) >= faults.lose_byte].tobytes()
+
+    def collect(self) -> bytes:
+        """Return what the host has sent since the last call."""
+        if not self._to_device:
+            return b""
+        data = b"".join(self._to_device)
+        self._to_device.clear()
+        return data
+
+    def read(self) -> bytes:
+        """Host side: everything that has arrived."""
+        self._check()
+        now, pieces = self._clock() + 1e-9, []
+        while self._to_host and self._to_host[0][0] <= now:
+            pieces.append(self._to_host.popleft()[1])
+        data = b"".join(pieces)
+        self._waiting -= len(data)
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Host side: send to the device."""
+        self._check()
+        if data:
+            self._to_device.append(bytes(data))
+
+    def _check(self) -> None:
+        if not self.plugged:
+            self._flush()
+            raise Unplugged(self.name)
+
+    def _flush(self) -> None:
+        self._to_host.clear()
+        self._to_device.clear()
+        self._waiting = 0
+
+    def pull(self, *, out: bool) -> None:
+        """Pull the plug, or put it back."""
+        self._pulled = out
+        if out:
+            self._flush()
+
+
+class HostPort:
+    """The host's end of a cable: read what is there, write without waiting."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+
+    @property
+    def name(self) -> str:
+        """Which device is at the other end."""
+        return self._link.name
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the cable is in."""
+        return self._link.plugged
+
+    def read(self) -> bytes:
+        """Return everything that has arrived by now, perhaps nothing. Raises Unplugged."""
+        return self._link.read()
+
+    def write(self, data: bytes) -> None:
+        """Send to the device. Raises Unplugged."""
+        self._link.write(data)
+
+    def unplug(self) -> None:
+        """Pull the cable: what is under way is lost."""
+        self._link.pull(out=True)
+
+    def replug(self) -> None:
+        """Put the cable back; the device has been powered all the time."""
+        self._link.pull(out=False)

@@ -1,0 +1,141 @@
+"""One robot in one world on a virtual clock: host ends of two cables, and the truth beside them."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.base import BIT_RATE, Base, BaseConfig
+from sim.hokuyo import HokuyoConfig, HokuyoFirmware
+from sim.link import HostPort, Link, LinkFaults
+from sim.scene import Scene
+from sim.urg import Urg, UrgConfig
+from sim.world import World
+
+STEP_S = 0.010  # physics; at 0.7 m/s the body moves 7 mm
+USB_S = 0.001  # one USB frame
+SCAN_USB_S = 0.003  # 2137 bytes in 64-byte packets at full speed
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """What goes wrong on the two cables; stuck encoders: BodyConfig; a blocked laser: UrgConfig."""
+
+    kobuki: LinkFaults = field(default_factory=LinkFaults)
+    hokuyo: LinkFaults = field(default_factory=LinkFaults)
+
+
+@dataclass(frozen=True, slots=True)
+class SimConfig:
+    """How the robot is built."""
+
+    base: BaseConfig = field(default_factory=BaseConfig)
+    urg: UrgConfig = field(default_factory=UrgConfig)
+    scanner: HokuyoConfig = field(default_factory=HokuyoConfig)
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What only the simulator knows. For reports and tests, never for the robot."""
+
+    stamp_s: float
+    T_world_base: NDArray[np.float64]
+    """float64 (3,): x m, y m, yaw rad in [-pi, pi)."""
+    height_m: float
+    path_m: float
+    """Distance driven by the middle of the body."""
+    contact_count: int
+    """How often the body began to touch something."""
+    contact_s: float
+    touching: bool
+    room: str | None
+
+
+class Simulator:
+    """The devices and the world behind them. Same seed and same bytes in give the same bytes out."""
+
+    def __init__(
+        self,
+        world: World,
+        seed: int = 0,
+        faults: Faults | None = None,
+        config: SimConfig | None = None,
+        *,
+        gui: bool = False,
+    ) -> None:
+        faults, config = faults or Faults(), config or SimConfig()
+        base_rng, urg_rng, kobuki_rng, hokuyo_rng, mover_rng = np.random.default_rng(seed).spawn(5)
+        self.world = world
+        self.config = config
+        self.now_s = 0.0
+        self._ticks = 0
+        self._path_m = 0.0
+        self._scene = Scene(world, gui=gui)
+        self.base = Base(world, self._scene, config.base, base_rng)
+        self._urg = Urg(self._scene, config.urg, urg_rng)
+        self.scanner = HokuyoFirmware(config.scanner)
+        self._kobuki = Link("kobuki", faults.kobuki, kobuki_rng, lambda: self.now_s)
+        self._hokuyo = Link("hokuyo", faults.hokuyo, hokuyo_rng, lambda: self.now_s)
+        self._motions = [mover.begin(int(mover_rng.integers(1 << 31))) for mover in world.movers]
+
+    @property
+    def kobuki(self) -> HostPort:
+        """Host end of the base's cable."""
+        return self._kobuki.host
+
+    @property
+    def hokuyo(self) -> HostPort:
+        """Host end of the laser's cable."""
+        return self._hokuyo.host
+
+    def advance(self, until_s: float) -> None:
+        """Let time pass. Commands written before take effect at the next physics step."""
+        while (self._ticks + 1) * STEP_S <= until_s + 1e-9:
+            self._tick()
+        self.now_s = max(self.now_s, until_s)
+
+    def close(self) -> None:
+        """Free the physics engine. Closing twice is fine."""
+        self._scene.close()
+
+    def truth(self) -> Truth:
+        """Return where the robot really is and what it has touched."""
+        body = self.base.body
+        x, y, yaw = body.state.pose
+        return Truth(
+            stamp_s=self._ticks * STEP_S,
+            T_world_base=np.array([x, y, (yaw + math.pi) % (2 * math.pi) - math.pi]),
+            height_m=body.state.height_m,
+            path_m=self._path_m,
+            contact_count=body.contact_count,
+            contact_s=body.contact_s,
+            touching=bool(body.contacts),
+            room=self.world.truth.room_at(x, y),
+        )
+
+    def _tick(self) -> None:
+        begin, end = self._ticks * STEP_S, (self._ticks + 1) * STEP_S
+        self._listen(begin)
+        before = self.base.body.state
+        for index, motion in enumerate(self._motions):
+            self._scene.place_mover(index, motion.step(end, STEP_S, before.pose))
+        due = self.base.packet_s
+        packet = self.base.step(end, STEP_S)
+        self._kobuki.deliver(packet, due + len(packet) * 10.0 / BIT_RATE + USB_S)
+        after = self.base.body.state
+        self._path_m += math.hypot(after.x - before.x, after.y - before.y)
+        scan = self._urg.step(begin, end, before, after, laser_on=self.scanner.laser_on)
+        if scan is not None:
+            self._hokuyo.deliver(self.scanner.scan_done(self._urg.finished_s, scan), end + SCAN_USB_S)
+        self._ticks += 1
+        self.now_s = end
+
+    def _listen(self, now_s: float) -> None:
+        """Hand what the host has written to the devices."""
+        data = self._kobuki.collect()
+        if data:
+            self.base.firmware.receive(data, now_s)
+        data = self._hokuyo.collect()
+        if data:
+            self._hokuyo.deliver(self.scanner.receive(data, now_s), now_s + USB_S)
