@@ -1,0 +1,140 @@
+"""Does this frame fit the one before it? The second line of defence behind an 8-bit XOR.
+
+Two flipped bits in one column of a frame keep its XOR. Many such frames still show: the timestamp leaves the
+20 ms grid, an encoder leaps, the heading moves without a rate, the running number of the gyro samples breaks.
+A rule that a robot's firmware keeps breaking is silenced (it is then the rule that is wrong), and a frame
+that fits the refused one before it instead of the accepted one is accepted: the world really did jump (lifted
+robot, reset odometry).
+"""
+
+from dataclasses import dataclass
+
+from drivers.kobuki.packets import RAW_GYRO_DPS_PER_DIGIT, Feedback
+
+
+@dataclass(frozen=True, slots=True)
+class PlausibilityConfig:
+    """Limits between two frames."""
+
+    period_ms: int = 20  # protocol.rst
+    grid_ms: int = 1  # published logs show exact multiples of the period
+    max_wheel_ticks_per_ms: float = 12.0  # 1 m/s; the robot does 0.7, a lifted wheel a little more
+    wheel_slack_ticks: int = 20
+    max_heading_cdeg: int = 300  # 3 deg in 20 ms without any rate: 150 deg/s of shock
+    max_rate_gap_dps: float = 30.0  # heading rate against the raw gyro, plus half of the rate itself
+    max_voltage_step_dv: int = 15  # starting motors pull 0.5 V
+    longest_gap_ms: int = 1000  # over a longer one nothing is compared
+    silence_after: int = 8
+    """A rule that refused this many frames more than it passed (a pass counts 1/50) is silenced."""
+
+
+class FrameGate:
+    """Remembers the last accepted frame of one robot."""
+
+    def __init__(self, config: PlausibilityConfig) -> None:
+        self._config = config
+        self._accepted: Feedback | None = None
+        self._refused: Feedback | None = None
+        self._strikes: dict[str, float] = {}
+        self._rules = {
+            "composition": _composition_differs,
+            "timestamp": self._off_grid,
+            "encoder": self._encoder_leaps,
+            "heading": self._heading_leaps,
+            "heading rate": self._rate_disagrees,
+            "gyro count": self._gyro_count_breaks,
+            "supply": self._voltage_leaps,
+            "spare bytes": _spare_bytes_change,
+        }
+
+    def restart(self) -> None:
+        """Forget the last frame: the next one is compared with nothing."""
+        self._accepted = self._refused = None
+
+    def check(self, frame: Feedback) -> str | None:
+        """Return why the frame cannot follow the last accepted one, or None and remember it."""
+        broken = self._broken_rule(self._accepted, frame, count=True)
+        if broken is not None and self._refused is not None and not self._broken_rule(self._refused, frame):
+            broken = None
+        if broken is None:
+            self._accepted, self._refused = frame, None
+            return None
+        self._refused = frame
+        return f"{broken} does not fit the frame before"
+
+    def _broken_rule(self, before: Feedback | None, frame: Feedback, *, count: bool = False) -> str | None:
+        if before is None:
+            return None
+        elapsed_ms = (frame.basic.timestamp_ms - before.basic.timestamp_ms) & 0xFFFF
+        if elapsed_ms > self._config.longest_gap_ms:
+            return None  # the clock mapping judges the timestamp itself
+        broken = None
+        for name, rule in self._rules.items():
+            strikes = self._strikes.get(name, 0.0)
+            if strikes >= self._config.silence_after:
+                continue
+            breaks = rule(before, frame, elapsed_ms)
+            if count:
+                self._strikes[name] = strikes + 1.0 if breaks else max(0.0, strikes - 0.02)
+            if breaks:
+                broken = broken or name
+        return broken
+
+    def _off_grid(self, _before: Feedback, _frame: Feedback, elapsed_ms: int) -> bool:
+        period, grid = self._config.period_ms, self._config.grid_ms
+        return elapsed_ms < period - grid or (elapsed_ms + grid) % period > 2 * grid
+
+    def _encoder_leaps(self, before: Feedback, frame: Feedback, elapsed_ms: int) -> bool:
+        a, b = before.basic, frame.basic
+        limit = self._config.max_wheel_ticks_per_ms * elapsed_ms + self._config.wheel_slack_ticks
+        left = (b.left_ticks - a.left_ticks + 0x8000) % 0x10000 - 0x8000
+        right = (b.right_ticks - a.right_ticks + 0x8000) % 0x10000 - 0x8000
+        return abs(left) > limit or abs(right) > limit
+
+    def _heading_leaps(self, before: Feedback, frame: Feedback, elapsed_ms: int) -> bool:
+        a, b = before.inertial, frame.inertial
+        if a is None or b is None:
+            return False
+        turn = (b.angle_cdeg - a.angle_cdeg + 18000) % 36000 - 18000
+        fastest = max(abs(a.rate_cdegps), abs(b.rate_cdegps))
+        periods = elapsed_ms / self._config.period_ms
+        return abs(turn) > self._config.max_heading_cdeg * periods + fastest * elapsed_ms * 1e-3
+
+    def _rate_disagrees(self, _before: Feedback, frame: Feedback, _elapsed_ms: int) -> bool:
+        if frame.inertial is None or frame.raw_gyro is None or not frame.raw_gyro.samples:
+            return False
+        rate = 0.01 * frame.inertial.rate_cdegps
+        limit = self._config.max_rate_gap_dps + 0.5 * abs(rate)
+        return all(abs(RAW_GYRO_DPS_PER_DIGIT * z - rate) > limit for _, _, z in frame.raw_gyro.samples)
+
+    def _gyro_count_breaks(self, before: Feedback, frame: Feedback, elapsed_ms: int) -> bool:
+        if (
+            before.raw_gyro is None
+            or frame.raw_gyro is None
+            or elapsed_ms > self._config.period_ms + self._config.grid_ms
+        ):
+            return False
+        expected = before.raw_gyro.frame_id + len(before.raw_gyro.samples)
+        return (frame.raw_gyro.frame_id - expected) & 0xFF != 0
+
+    def _voltage_leaps(self, before: Feedback, frame: Feedback, _elapsed_ms: int) -> bool:
+        return abs(frame.basic.battery_dv - before.basic.battery_dv) > self._config.max_voltage_step_dv
+
+
+_STREAMED = ("docking_ir", "inertial", "cliff_adc", "current", "raw_gyro", "inputs")
+
+
+def _composition_differs(before: Feedback, frame: Feedback, _elapsed_ms: int) -> bool:
+    """Parts that stream always are there or not, from frame to frame alike; ids nobody knows do not come and
+    go.
+    """
+    if any((getattr(before, name) is None) != (getattr(frame, name) is None) for name in _STREAMED):
+        return True
+    return [number for number, _ in before.unknown] != [number for number, _ in frame.unknown]
+
+
+def _spare_bytes_change(before: Feedback, frame: Feedback, _elapsed_ms: int) -> bool:
+    """Bytes without meaning stay as they are."""
+    if before.inertial and frame.inertial and before.inertial.unused != frame.inertial.unused:
+        return True
+    return bool(before.inputs and frame.inputs and before.inputs.spare[1:] != frame.inputs.spare[1:])
