@@ -33,8 +33,12 @@ class Bumped:
 
 @dataclass(frozen=True, slots=True)
 class OpeningSeen:
-    """An opening towards unexplored space, in the frame of a node."""
+    """An opening towards unexplored space, in the frame of a node; known already or new.
 
+    Navigation gives the ID, counting on from the largest in the map, so that it can name the opening later.
+    """
+
+    placeholder_id: int
     node_id: int
     x_m: float
     y_m: float

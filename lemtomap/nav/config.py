@@ -1,0 +1,99 @@
+"""Settings of navigation, one frozen dataclass a stage; the source stands beside each value."""
+
+from dataclasses import dataclass, field
+
+from lemtomap.errors import BadSetting
+
+
+@dataclass(frozen=True, slots=True)
+class BodyLimits:
+    """What a Kobuki can do and how much room it takes."""
+
+    radius_m: float = 0.18  # body diameter 0.3515 m (Kobuki drawing), rounded up
+    v_max_mps: float = 0.5  # thesis' DWA setting; the base can do 0.7
+    w_max_radps: float = 1.5  # below 110 deg/s, where the gyro degrades (Kobuki manual)
+    acceleration_mps2: float = 0.5  # yocs smoother default of the TurtleBot 2
+    braking_mps2: float = 0.8  # smoother decel_factor 1.5 and the wheels' own drag
+    turn_acceleration_radps2: float = 3.0  # yocs smoother: 3.5
+    reaction_s: float = 0.15  # one control period and the base's own 20 ms cycles
+
+    def __post_init__(self) -> None:
+        for name in ("radius_m", "v_max_mps", "w_max_radps", "acceleration_mps2", "braking_mps2"):
+            if not getattr(self, name) > 0.0:
+                raise BadSetting(f"navigation: {name} = {getattr(self, name)} must be above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class CostmapConfig:
+    """Layers of the costmap over the rolling window."""
+
+    occupied_percent: int = 50  # a cell at least this full is a wall
+    margin_m: float = 0.025  # half a cell: where in its cell the wall stands is not known
+    inflation_m: float = 0.60  # as far as walls are felt; 0.50 in the thesis' setting
+    near_wall_cost: float = 4.0  # extra cost per metre right beside a wall
+    falloff_m: float = 0.12  # e-folding of that extra cost
+    unknown_factor: float = 4.0  # unseen floor is driven only where nothing seen leads there
+    live_hits: int = 2  # scans that must agree before a live obstacle counts: single ghosts do not
+    live_decay_s: float = 3.0  # a live obstacle not seen again is believed this long
+    live_range_m: float = 4.0  # beyond, the window alone is good enough
+    contact_radius_m: float = 0.06  # a bump says where within about a cell
+    contact_memory_s: float = 1800.0  # what the laser overlooks cannot be seen to go away
+
+
+@dataclass(frozen=True, slots=True)
+class DwaConfig:
+    """Dynamic Window Approach (Fox, Burgard and Thrun, 1997)."""
+
+    v_samples: int = 21
+    w_samples: int = 51  # odd, so that straight on is among them: 1,071 trajectories
+    window_s: float = 0.3  # velocities reachable in this time are tried
+    horizon_s: float = 1.6
+    step_s: float = 0.1
+    forward_m: float = 0.30  # the way ahead is read this far before the axle; thesis: 0.325
+    clearance_weight: float = 0.25  # metres of way for driving right beside something
+    clearance_falloff_m: float = 0.06
+    turn_weight: float = 0.02  # metres of way per rad/s: prefer straight of equal choices
+    change_weight: float = 0.03  # metres of way per rad/s of change: prefer steady of equal choices
+
+
+@dataclass(frozen=True, slots=True)
+class RouteConfig:
+    """Costs of the topological route."""
+
+    usual_speed_mps: float = 0.4  # what an edge without a learnt time is expected to take
+    learnt_weight: float = 0.5  # share of learnt time against length over usual speed
+
+
+@dataclass(frozen=True, slots=True)
+class RecoveryConfig:
+    """When it does not work: each rung of the ladder is bounded in time and distance."""
+
+    progress_m: float = 0.20  # nearer to the goal by this much ...
+    progress_s: float = 8.0  # ... within this time, or something is wrong
+    polite_wait_s: float = 6.0  # what moves is given this long to make way
+    closed_after_s: float = 2.5  # what stands still for this long is closed
+    turn_s: float = 7.0
+    turn_radps: float = 1.0
+    back_off_m: float = 0.40
+    back_off_s: float = 5.0
+    back_off_mps: float = 0.10
+    block_s: float = 60.0  # a closed edge is tried again after this
+    lost_patience_s: float = 20.0
+    attempts: int = 3  # times through the ladder without progress before giving up
+
+
+@dataclass(frozen=True, slots=True)
+class NavConfig:
+    """Everything the navigator can be told."""
+
+    body: BodyLimits = field(default_factory=BodyLimits)
+    costmap: CostmapConfig = field(default_factory=CostmapConfig)
+    dwa: DwaConfig = field(default_factory=DwaConfig)
+    route: RouteConfig = field(default_factory=RouteConfig)
+    recovery: RecoveryConfig = field(default_factory=RecoveryConfig)
+    period_s: float = 0.1  # control cycle, design section 4
+    plan_period_s: float = 0.2  # the field towards the metric goal is renewed this often
+    goal_tolerance_m: float = 0.12  # thesis' DWA setting: 0.15
+    yaw_tolerance_rad: float = 0.10
+    turn_start_rad: float = 1.05  # turn in place when the way starts further off than this (60 degrees)
+    turn_end_rad: float = 0.30

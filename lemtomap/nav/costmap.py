@@ -1,0 +1,152 @@
+"""The layered costmap over the rolling window: grid, live obstacles, hazards, inflation (thesis, 2-4-1).
+
+Everything lives in the grid frame on the window's own cells and moves along when the window rolls.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lemtomap import se2
+from lemtomap.nav import kernels
+from lemtomap.nav.config import BodyLimits, CostmapConfig
+from lemtomap.nav.types import CostmapView, Points, Sighting
+from lemtomap.se2 import Pose
+from lemtomap.types import GridView
+
+TIGHT_COST = 25.0
+"""Price of a cell inside the body's margin, open only to leave it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """One moment's costmap. Arrays are (rows, cols), [0, 0] at the corner of least x and y."""
+
+    stamp_s: float
+    resolution_m: float
+    origin_m: tuple[float, float]
+    state: NDArray[np.uint8]
+    """kernels.FREE, UNKNOWN or LETHAL."""
+    clearance: NDArray[np.float32]
+    """Cells to the nearest obstacle's centre, capped."""
+    cost: NDArray[np.float32]
+    """Price of a cell of way; inf where the body does not fit."""
+
+    def cell(self, p_grid: ArrayLike) -> tuple[float, float]:
+        """Return (row, col) as real numbers of a point in the grid frame."""
+        x, y = np.asarray(p_grid, dtype=np.float64)[:2]
+        return (y - self.origin_m[1]) / self.resolution_m, (x - self.origin_m[0]) / self.resolution_m
+
+    def holds(self, p_grid: ArrayLike, margin_m: float = 0.0) -> bool:
+        """Tell whether a point lies inside the window, at least margin_m from its border."""
+        row, col = self.cell(p_grid)
+        margin = margin_m / self.resolution_m
+        rows, cols = self.state.shape
+        return bool(margin <= row < rows - margin and margin <= col < cols - margin)
+
+    def to_grid(self, rows_cols: NDArray[np.float64]) -> Points:
+        """Return points (N, 2) in the grid frame of [row, col] pairs (N, 2)."""
+        return np.asarray(rows_cols[:, ::-1] * self.resolution_m + np.array(self.origin_m))
+
+    def view(self) -> CostmapView:
+        """Return the picture viewers show."""
+        picture = np.where(np.isinf(self.cost), 253.0, np.clip((self.cost - 1.0) * 50.0, 0.0, 252.0))
+        picture[self.state == kernels.UNKNOWN] = 255
+        picture[self.state == kernels.LETHAL] = 254
+        cost = picture.astype(np.uint8)
+        cost.setflags(write=False)
+        return CostmapView(self.stamp_s, cost, self.resolution_m, self.origin_m)
+
+
+class LiveLayer:
+    """Obstacles one sensor saw lately, with the time each was last seen."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.last_hit_s = np.full(shape, -np.inf)
+        self.hits = np.zeros(shape, dtype=np.uint8)
+
+    def roll(self, rows: int, cols: int) -> None:
+        """Follow the window by whole cells."""
+        self.last_hit_s = kernels.shift_cells(self.last_hit_s, rows, cols, -np.inf)
+        self.hits = kernels.shift_cells(self.hits, rows, cols, 0)
+
+
+class Costmap:
+    """Keeps the layers; `build` melts them into one `Costs`."""
+
+    def __init__(self, config: CostmapConfig, body: BodyLimits) -> None:
+        self._config = config
+        self._body = body
+        self._live: dict[str, LiveLayer] = {}
+        self._grid: GridView | None = None
+
+    def follow_window(self, grid: GridView) -> None:
+        """Take the newest window; live layers move along with it."""
+        old, self._grid = self._grid, grid
+        if old is None or old is grid:
+            return
+        same = old.resolution_m == grid.resolution_m and old.occupancy.shape == grid.occupancy.shape
+        cols, rows = (np.array(grid.origin_m) - np.array(old.origin_m)) / grid.resolution_m
+        if not same:
+            self._live.clear()
+        elif round(rows) != 0 or round(cols) != 0:
+            for layer in self._live.values():
+                layer.roll(round(rows), round(cols))
+
+    def see(self, sighting: Sighting, T_grid_odom: Pose) -> None:
+        """Clear along the rays of one sighting, those without return too, then mark what they met."""
+        grid = self._grid
+        if grid is None:
+            return
+        layer = self._live.setdefault(sighting.source, LiveLayer(grid.occupancy.shape))
+        T_grid_base = se2.compose(T_grid_odom, sighting.T_odom_base)
+        origin = np.asarray(sighting.origin_base)
+        rays = np.concatenate([sighting.hits_base, sighting.misses_base]) - origin
+        length = np.hypot(rays[:, 0], rays[:, 1])
+        reach = self._config.live_range_m
+        near = length <= reach
+        scale = np.where(near, 1.0, reach / np.maximum(length, 1e-9))
+        ends = self._cells(se2.transform(T_grid_base, origin + rays * scale[:, None]))
+        start = self._cells(se2.transform(T_grid_base, origin[None, :]))[0]
+        if sighting.misses_base.size or sighting.hits_base.size:
+            kernels.clear_rays(layer.last_hit_s, layer.hits, start[0], start[1], ends[:, 0], ends[:, 1], 1.5)
+        marks = ends[: len(sighting.hits_base)][near[: len(sighting.hits_base)]]
+        kernels.mark_hits(layer.last_hit_s, layer.hits, marks[:, 0], marks[:, 1], sighting.stamp_s)
+
+    def forget_live(self) -> None:
+        """Drop all live obstacles: the next scans tell anew."""
+        self._live.clear()
+
+    def build(self, now_s: float, hazards_grid: Points, p_robot_grid: ArrayLike) -> Costs:
+        """Return the costmap of this moment. hazards_grid: float64 (N, 2), metres, what was met by touch."""
+        grid, config = self._grid, self._config
+        if grid is None:
+            raise RuntimeError("build before follow_window")
+        state = np.empty(grid.occupancy.shape, dtype=np.uint8)
+        kernels.classify(grid.occupancy, config.occupied_percent, state)
+        for layer in self._live.values():
+            kernels.add_live(
+                state, layer.last_hit_s, layer.hits, now_s, config.live_decay_s, config.live_hits
+            )
+        res = grid.resolution_m
+        for row, col in self._cells(hazards_grid):
+            kernels.stamp_disc(state, row, col, config.contact_radius_m / res, kernels.LETHAL)
+        reach = (config.inflation_m + self._body.radius_m) / res
+        clearance = kernels.clearance_transform(state, reach)
+        body = (self._body.radius_m + config.margin_m) / res
+        cost = kernels.traversal_cost(
+            state, clearance, body, config.near_wall_cost, config.falloff_m / res, config.unknown_factor
+        )
+        costs = Costs(now_s, res, grid.origin_m, state, clearance, cost)
+        row, col = costs.cell(p_robot_grid)
+        if costs.holds(p_robot_grid) and np.isinf(cost[int(row), int(col)]):
+            kernels.open_start(cost, clearance, row, col, 0.30 / res, TIGHT_COST)
+        return costs
+
+    def _cells(self, p_grid: Points) -> NDArray[np.float64]:
+        """Return [row, col] real numbers (N, 2)."""
+        grid = self._grid
+        if grid is None:
+            raise RuntimeError("no window yet")
+        return np.asarray((p_grid - np.array(grid.origin_m))[:, ::-1] / grid.resolution_m)

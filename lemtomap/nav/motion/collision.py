@@ -1,0 +1,51 @@
+"""The last check before the command leaves navigation: on raw range points, independent of every map."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from lemtomap import se2
+from lemtomap.nav.config import BodyLimits
+from lemtomap.nav.motion import kernels
+from lemtomap.nav.types import Points, Sighting
+from lemtomap.se2 import Pose
+from lemtomap.types import Twist
+
+HORIZON_S = 2.0
+STEP_S = 0.05
+SKIN_M = 0.015
+"""Beyond the body's radius; the URG-04LX errs by 30 mm at 1 m, so a wider skin would stick at walls."""
+STOP_SHORT_M = 0.03
+
+
+def points_now(sightings: Iterable[Sighting], T_odom_base: Pose, within_m: float = 1.6) -> Points:
+    """Return the hits of the sightings, float64 (N, 2), metres, in the present base frame, near ones only."""
+    parts = [
+        se2.transform(se2.between(T_odom_base, sighting.T_odom_base), sighting.hits_base)
+        for sighting in sightings
+    ]
+    points = np.concatenate([np.empty((0, 2)), *parts])
+    return np.ascontiguousarray(points[np.hypot(points[:, 0], points[:, 1]) < within_m])
+
+
+def limit_twist(twist: Twist, points_base: Points, body: BodyLimits) -> Twist:
+    """Slow down, to a stop if need be, so that the robot can halt before touching any point on its arc.
+
+    points_base: float64 (N, 2), metres, base frame. Curvature is kept while slowing; turning in place stays
+    allowed at a standstill, as the body is round.
+    """
+    if twist.v_mps == 0.0 or points_base.size == 0:
+        return twist
+    free_m = kernels.free_arc_length(
+        points_base, twist.v_mps, twist.w_radps, body.radius_m + SKIN_M, HORIZON_S, STEP_S
+    )
+    if np.isinf(free_m):
+        return twist
+    room = max(0.0, free_m - STOP_SHORT_M)
+    brake, react = body.braking_mps2, body.reaction_s
+    v_safe = brake * (np.sqrt(react * react + 2.0 * room / brake) - react)
+    if v_safe >= abs(twist.v_mps):
+        return twist
+    share = float(v_safe) / abs(twist.v_mps)
+    turn = twist.w_radps * share if share > 0.05 else twist.w_radps
+    return Twist(twist.v_mps * share, turn)

@@ -1,0 +1,399 @@
+"""The navigator: first topological, then metric, then a velocity (thesis, 3-5; one object instead of three).
+
+    goal -> route over nodes -> sliding metric goal -> field in the window -> DWA -> raw points -> twist
+
+`step` is called at control rate and never waits; each call says what it does and, when it cannot, why.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap import se2
+from lemtomap.errors import NoRoute
+from lemtomap.nav.config import NavConfig
+from lemtomap.nav.costmap import Costs
+from lemtomap.nav.follower import Follower, Motion, Step
+from lemtomap.nav.metric import MetricPlan, Reach, plan_to, reach_from
+from lemtomap.nav.motion.collision import limit_twist
+from lemtomap.nav.motion.dwa import approach
+from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
+from lemtomap.nav.route.planner import Route, plan_route
+from lemtomap.nav.sliding import BORDER_M, Target, choose_target, find_barrier, place_of
+from lemtomap.nav.surroundings import Surroundings
+from lemtomap.nav.types import (
+    Contact,
+    CostmapView,
+    Goal,
+    NavOutput,
+    NavState,
+    Reason,
+    Sighting,
+)
+from lemtomap.nav.watching import BarrierWatch, EdgeClock, Link, links_cut, links_open_again
+from lemtomap.se2 import Pose
+from lemtomap.topo.events import EdgeBlocked, NavEvent
+from lemtomap.types import MapView, RouteGraph, Twist
+
+NEAR_BARRIER_M = 1.0
+BUMP_BACK_M = 0.15
+REST = Twist(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """What one control cycle knows."""
+
+    map_view: MapView
+    graph: RouteGraph
+    T_odom_base: Pose
+    T_grid_base: Pose
+    twist: Twist
+    now_s: float
+    events: list[NavEvent] = field(default_factory=list)
+
+
+class Navigator:
+    """Drives to goals, one at a time; a new goal replaces the old one without a stop."""
+
+    def __init__(self, config: NavConfig | None = None) -> None:
+        self.config = config or NavConfig()
+        self.surroundings = Surroundings(self.config)
+        self.costs: Costs | None = None
+        """The newest costmap, for whoever wants to see or use it."""
+        self._costmap_view: CostmapView | None = None
+        self._goal: Goal | None = None
+        self._end: tuple[NavState, Reason, str] = (NavState.IDLE, Reason.NONE, "no goal")
+        self._route: Route | None = None
+        self._route_version: int | None = None
+        self._closed: dict[int, float] = {}
+        self._plan: MetricPlan | None = None
+        self._target: Target | None = None
+        self._planned_s = -np.inf
+        self._lost_s: float | None = None
+        self._waiting_s: float | None = None
+        self._command = REST
+        self._cycle = 0
+        self._follower = Follower(self.config)
+        self._progress = ProgressWatch(self.config.recovery)
+        self._ladder = Ladder(self.config.recovery)
+        self._way_back = WayBack()
+        self._barriers = BarrierWatch(self.config.recovery)
+        self._edge_clock = EdgeClock()
+
+    @property
+    def goal(self) -> Goal | None:
+        """The goal under way; None when arrived, failed or idle."""
+        return self._goal
+
+    def set_goal(self, goal: Goal | int, now_s: float) -> None:
+        """Take a new goal (an int is a node's id); accepted in every state."""
+        self._goal = Goal(goal) if isinstance(goal, int) else goal
+        self._route, self._plan, self._target = None, None, None
+        self._waiting_s = self._lost_s = None
+        self._planned_s = -np.inf
+        self._follower.restart()
+        self._barriers.reset()
+        self._ladder.reset()
+        self._progress.restart(now_s)
+
+    def cancel(self) -> None:
+        """Drop the goal; the robot comes to rest within its limits."""
+        if self._goal is not None:
+            self._finish(NavState.IDLE, Reason.CANCELLED, "goal cancelled")
+
+    def step(
+        self,
+        map_view: MapView,
+        graph: RouteGraph,
+        T_odom_base: Pose,
+        twist: Twist,
+        scan_points_base: Sighting | Sequence[Sighting] | NDArray[np.floating] | None,
+        bumps: Sequence[Contact],
+        now_s: float,
+    ) -> NavOutput:
+        """Run one control cycle.
+
+        scan_points_base: what range sensors saw lately: sightings (which know free rays and their time), or
+        bare points (N, 2) in the base frame of now. bumps: contacts since the last call. The pose for
+        control is compose(T_grid_odom, T_odom_base), so it is as fresh as the odometry.
+        """
+        self._cycle += 1
+        T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
+        moment = _Moment(map_view, graph, T_odom_base, T_grid_base, self._speed(twist), now_s)
+        self._way_back.drove(T_odom_base)
+        self.surroundings.take(map_view, _as_sightings(scan_points_base, T_odom_base, now_s))
+        self._feel(bumps, moment)
+        output = self._act(moment) if self._goal is not None else self._rest(moment)
+        self._command = output.twist
+        driving = output.state in {NavState.DRIVING, NavState.TURNING}
+        traversed = self._edge_clock.step(map_view.associated_id, graph, now_s, driving=driving)
+        events = (*moment.events, *((traversed,) if traversed else ()))
+        return replace(output, events=events, cycle=self._cycle)
+
+    def _speed(self, measured: Twist) -> Twist:
+        """Trust our own last command where the measured speed is near it: it is smooth and not late."""
+        close = abs(measured.v_mps - self._command.v_mps) < 0.15
+        steady = abs(measured.w_radps - self._command.w_radps) < 0.6
+        return Twist(
+            self._command.v_mps if close else measured.v_mps,
+            self._command.w_radps if steady else measured.w_radps,
+        )
+
+    def _feel(self, bumps: Sequence[Contact], moment: _Moment) -> None:
+        """Remember contacts and leave them backwards."""
+        for contact in bumps:
+            moment.events.append(self.surroundings.touch(contact, moment.map_view, moment.T_grid_base))
+        if bumps and self._goal is not None:
+            self._ladder.back_off(moment.T_odom_base, moment.now_s, BUMP_BACK_M)
+            self._planned_s = -np.inf
+
+    # ---- one cycle with a goal ----
+
+    def _act(self, moment: _Moment) -> NavOutput:
+        if moment.map_view.lost:
+            return self._wait_for_pose(moment)
+        self._lost_s = None
+        try:
+            route = self._keep_route(moment)
+        except NoRoute as error:
+            return self._fail(moment, Reason.NO_ROUTE, str(error))
+        if moment.now_s - self._planned_s >= self.config.plan_period_s - 1e-6 or self._plan is None:
+            self._replan(route, moment)
+            if self._route is None:  # an edge was closed: look for another way at once
+                return self._act(moment)
+            route = self._route
+        recovering = self._recover_step(moment)
+        if recovering is not None:
+            return recovering
+        if self._plan is None or self._target is None:
+            return self._no_way(route, moment)
+        self._waiting_s = None
+        return self._drive(route, self._plan, self._target, moment)
+
+    def _keep_route(self, moment: _Moment) -> Route:
+        """Return the route from the associated node, planned anew only when the map or the way changed."""
+        goal, graph, here = self._goal, moment.graph, moment.map_view.associated_id
+        if goal is None:
+            raise RuntimeError("no goal")
+        route = self._route
+        if route is not None and self._route_version == graph.version and here in route.nodes:
+            self._route = route.since(here)
+            return self._route
+        self._closed = {edge: until for edge, until in self._closed.items() if until > moment.now_s}
+        route = plan_route(graph, here, goal.node_id, moment.now_s, self.config.route, self._closed)
+        self._route, self._route_version = route, graph.version
+        return route
+
+    def _replan(self, route: Route, moment: _Moment) -> None:
+        """Renew costmap, reachable part, sliding goal and the field towards it."""
+        goal, view = self._goal, moment.map_view
+        if goal is None:
+            return
+        self._planned_s = moment.now_s
+        self.costs = costs = self.surroundings.costs(view, moment.T_grid_base, moment.now_s)
+        self._costmap_view = costs.view()
+        reach = reach_from(costs, moment.T_grid_base)
+        self._barriers.remember(costs)
+        tolerance = goal.tolerance_m or self.config.goal_tolerance_m
+        self._target = choose_target(route, goal, view.T_grid_node, reach, tolerance)
+        self._plan = None
+        if self._target is not None:
+            self._plan = plan_to(costs, moment.T_grid_base, self._target.cell)
+        self._reopen(reach, moment)
+        self._check_barrier(route, reach, moment)
+
+    def _reopen(self, reach: Reach, moment: _Moment) -> None:
+        for edge_id, a, b in links_open_again(self._closed, moment.map_view, reach):
+            del self._closed[edge_id]
+            moment.events.append(EdgeBlocked(a, b, 0.0))
+
+    def _check_barrier(self, route: Route, reach: Reach, moment: _Moment) -> None:
+        """Close the edges a standing barrier cuts, once it is to be believed."""
+        goal = self._goal
+        beyond = 0 if self._target is None else self._target.index
+        barrier = None
+        if goal is not None and not (self._target is not None and self._target.final):
+            barrier = find_barrier(route, goal, moment.map_view.T_grid_node, reach, beyond)
+        if barrier is None:
+            self._barriers.reset()
+            return
+        away_m = float(np.hypot(*(np.array(barrier.p_near_grid) - moment.T_grid_base[:2])))
+        near = away_m < NEAR_BARRIER_M or self._target is None
+        if self._barriers.closed(barrier, reach.costs, near=near):
+            on_route = _link(route, barrier.index)
+            self._close([on_route, *links_cut(moment.map_view, reach, BORDER_M)], moment)
+
+    def _close(self, links: Sequence[Link], moment: _Moment) -> None:
+        """Plan around these edges from now on, and tell the map."""
+        until_s = moment.now_s + self.config.recovery.block_s
+        for edge_id, a, b in {link[0]: link for link in links}.values():
+            self._closed[edge_id] = until_s
+            moment.events.append(EdgeBlocked(a, b, until_s))
+        self._route, self._plan, self._target = None, None, None
+        self._waiting_s = None
+        self._barriers.reset()
+        self._progress.restart(moment.now_s)
+
+    # ---- driving ----
+
+    def _drive(self, route: Route, plan: MetricPlan, target: Target, moment: _Moment) -> NavOutput:
+        end_m = self._way_to_end(plan, moment.T_grid_base) if target.final else None
+        if end_m is not None and self._follower.at_goal(end_m, self._tolerance_m()):
+            step = self._follower.halt(moment.T_grid_base, moment.twist, self._goal_yaw(route, moment))
+            if step.motion == Motion.THERE:
+                self._finish(NavState.ARRIVED, Reason.NONE, f"arrived at node {route.nodes[-1]}")
+                return self._output(moment, REST, *self._end)
+        else:
+            step = self._follower.step(plan, moment.T_grid_base, moment.twist, end_m)
+        remaining_m = plan.length_m + sum(edge.length_m for edge in route.edges[target.index :])
+        if self._progress.stuck(remaining_m, moment.now_s):
+            return self._climb(moment)
+        if self._progress.advanced(moment.now_s) and not self._ladder.running:
+            self._ladder.reset()
+        return self._send(route, plan, target, step, moment)
+
+    def _send(self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: _Moment) -> NavOutput:
+        points = self.surroundings.points(moment.T_odom_base, moment.now_s)
+        twist = limit_twist(step.twist, points, self.config.body)
+        state = NavState.TURNING if step.motion == Motion.TURN else NavState.DRIVING
+        reason = (
+            Reason.OBSTACLE if step.motion == Motion.STUCK or twist.v_mps < step.twist.v_mps else Reason.NONE
+        )
+        rest = route.edges[target.index :]
+        remaining_m = plan.length_m + sum(edge.length_m for edge in rest)
+        speed_mps = self.config.route.usual_speed_mps
+        expected_s = plan.length_m / speed_mps + sum(edge.time_s for edge in rest)
+        return replace(
+            self._output(moment, twist, state, reason, f"to node {target.node_id}"),
+            remaining_m=remaining_m,
+            expected_s=expected_s,
+        )
+
+    def _way_to_end(self, plan: MetricPlan, T_grid_base: Pose) -> float:
+        away_m = float(np.hypot(*(np.array(plan.p_target_grid) - T_grid_base[:2])))
+        return max(away_m, 0.0) if plan.length_m < 1.0 else plan.length_m
+
+    def _tolerance_m(self) -> float:
+        goal = self._goal
+        return self.config.goal_tolerance_m if goal is None or goal.tolerance_m is None else goal.tolerance_m
+
+    def _goal_yaw(self, route: Route, moment: _Moment) -> float | None:
+        goal = self._goal
+        if goal is None or goal.yaw_node_rad is None:
+            return None
+        place = place_of(route, len(route.nodes) - 1, goal, moment.map_view.T_grid_node)
+        return None if place is None else float(place[2])
+
+    # ---- when it does not work ----
+
+    def _no_way(self, route: Route, moment: _Moment) -> NavOutput:
+        """Nothing of the route can be reached: wait a little, then climb the ladder."""
+        if self._waiting_s is None:
+            self._waiting_s = moment.now_s
+        patience_s = self.config.recovery.closed_after_s
+        if moment.now_s - self._waiting_s < patience_s:
+            slower = approach(moment.twist, REST, self.config.body, self.config.period_s)
+            text = f"no way to node {route.nodes[min(1, len(route.nodes) - 1)]} yet: waiting"
+            return self._output(moment, slower, NavState.WAITING, Reason.OBSTACLE, text)
+        self._waiting_s = moment.now_s
+        return self._climb(moment)
+
+    def _climb(self, moment: _Moment) -> NavOutput:
+        """Take the next rung of the ladder, or give up with the reason."""
+        if self._ladder.exhausted:
+            return self._fail(moment, Reason.BLOCKED, "no progress after every recovery")
+        rung = self._ladder.climb(moment.T_odom_base, moment.now_s)
+        self._progress.restart(moment.now_s)
+        self._planned_s = -np.inf
+        if rung == Rung.CLEAR:
+            self.surroundings.forget_live()
+        if rung == Rung.BLOCK and self._route is not None and self._route.edges:
+            self._close([_link(self._route, 0)], moment)
+        twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
+        return self._output(
+            moment, twist, NavState.RECOVERING, Reason.OBSTACLE, f"no progress: {rung.name.lower()}"
+        )
+
+    def _recover_step(self, moment: _Moment) -> NavOutput | None:
+        wanted = self._ladder.step(
+            moment.T_odom_base, self._way_back, moment.now_s, room_behind=self._room_behind(moment)
+        )
+        if wanted is None:
+            return None
+        name = self._ladder.name
+        if not self._ladder.running:
+            self._progress.restart(moment.now_s)
+        twist = approach(moment.twist, wanted, self.config.body, self.config.period_s)
+        points = self.surroundings.points(moment.T_odom_base, moment.now_s)
+        twist = limit_twist(twist, points, self.config.body)
+        return self._output(moment, twist, NavState.RECOVERING, Reason.OBSTACLE, name)
+
+    def _room_behind(self, moment: _Moment) -> bool:
+        """Tell whether the costmap leaves room 10 cm behind the robot."""
+        if self.costs is None:
+            return True
+        back = se2.transform(moment.T_grid_base, [-0.10, 0.0])
+        if not self.costs.holds(back):
+            return False
+        row, col = self.costs.cell(back)
+        here_row, here_col = self.costs.cell(moment.T_grid_base)
+        clear = self.costs.clearance
+        there, here = clear[int(row), int(col)], clear[int(here_row), int(here_col)]
+        return bool(there * self.costs.resolution_m >= self.config.body.radius_m or there > here)
+
+    def _wait_for_pose(self, moment: _Moment) -> NavOutput:
+        if self._lost_s is None:
+            self._lost_s = moment.now_s
+        if moment.now_s - self._lost_s > self.config.recovery.lost_patience_s:
+            return self._fail(moment, Reason.LOST, "the pose in the map was not found again")
+        self._progress.restart(moment.now_s)
+        twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
+        return self._output(moment, twist, NavState.WAITING, Reason.LOST, "pose lost: waiting for it")
+
+    def _fail(self, moment: _Moment, reason: Reason, text: str) -> NavOutput:
+        self._finish(NavState.FAILED, reason, text)
+        return self._rest(moment)
+
+    # ---- results ----
+
+    def _finish(self, state: NavState, reason: Reason, text: str) -> None:
+        self._end = (state, reason, text)
+        self._goal = self._route = self._plan = self._target = None
+
+    def _rest(self, moment: _Moment) -> NavOutput:
+        slower = approach(moment.twist, REST, self.config.body, self.config.period_s)
+        return self._output(moment, slower, *self._end)
+
+    def _output(self, moment: _Moment, twist: Twist, state: NavState, reason: Reason, text: str) -> NavOutput:
+        plan, target = self._plan, self._target
+        return NavOutput(
+            stamp_s=moment.now_s,
+            twist=twist,
+            state=state,
+            reason=reason,
+            text=text,
+            goal=self._goal,
+            route=() if self._route is None else self._route.nodes,
+            target_id=None if target is None else target.node_id,
+            local_path_grid=np.empty((0, 2)) if plan is None else plan.path_grid,
+            costmap=self._costmap_view,
+        )
+
+
+def _link(route: Route, index: int) -> Link:
+    return route.edges[index].edge_id, route.nodes[index], route.nodes[index + 1]
+
+
+def _as_sightings(
+    seen: Sighting | Sequence[Sighting] | NDArray[np.floating] | None, T_odom_base: Pose, now_s: float
+) -> Sequence[Sighting]:
+    if seen is None:
+        return ()
+    if isinstance(seen, Sighting):
+        return (seen,)
+    if isinstance(seen, np.ndarray):
+        return (Sighting.from_points(now_s, T_odom_base, seen),)
+    return seen

@@ -1,0 +1,151 @@
+"""What the robot does when it does not get on: a ladder of recoveries, each bounded in time and distance."""
+
+from collections import deque
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from lemtomap import se2
+from lemtomap.nav.config import RecoveryConfig
+from lemtomap.se2 import Pose
+from lemtomap.types import Twist
+
+
+class Rung(IntEnum):
+    """The ladder, in order."""
+
+    REPLAN = 0
+    CLEAR = 1
+    TURN = 2
+    BACK_OFF = 3
+    BLOCK = 4
+    """Close the next edge of the route and look for another way."""
+
+
+class ProgressWatch:
+    """Tells when the robot has not come nearer to its goal for too long."""
+
+    def __init__(self, config: RecoveryConfig) -> None:
+        self._config = config
+        self._best_m = np.inf
+        self._since_s = -np.inf
+
+    def restart(self, now_s: float) -> None:
+        """Begin anew: new goal, new route, or the way was made longer on purpose."""
+        self._best_m = np.inf
+        self._since_s = now_s
+
+    def stuck(self, remaining_m: float, now_s: float) -> bool:
+        """Take the way still to go; True when it has not shrunk for longer than allowed."""
+        if remaining_m < self._best_m - self._config.progress_m:
+            self._best_m = remaining_m
+            self._since_s = now_s
+        return now_s - self._since_s > self._config.progress_s
+
+    def advanced(self, now_s: float) -> bool:
+        """Tell whether there was progress in the last second."""
+        return bool(np.isfinite(self._best_m)) and now_s - self._since_s < 1.0
+
+
+class WayBack:
+    """The last metres driven, to go back along them."""
+
+    def __init__(self, length_m: float = 2.0, step_m: float = 0.04) -> None:
+        self._step_m = step_m
+        self._crumbs: deque[Pose] = deque(maxlen=int(length_m / step_m))
+
+    def drove(self, T_odom_base: Pose) -> None:
+        """Drop a crumb when the robot has moved on."""
+        if not self._crumbs or np.hypot(*(T_odom_base - self._crumbs[-1])[:2]) >= self._step_m:
+            self._crumbs.append(np.array(T_odom_base))
+
+    def twist_back(self, T_odom_base: Pose, v_mps: float) -> Twist:
+        """Return the reverse twist that follows the crumbs; straight back when there are none behind."""
+        while self._crumbs:
+            x, y, _ = se2.between(T_odom_base, self._crumbs[-1])
+            if x < -0.08:
+                away2 = x * x + y * y
+                return Twist(-v_mps, float(np.clip(-v_mps * 2.0 * y / away2, -0.5, 0.5)))
+            self._crumbs.pop()
+        return Twist(-v_mps, 0.0)
+
+
+@dataclass(slots=True)
+class _Running:
+    rung: Rung
+    until_s: float
+    limit_m: float
+    T_odom_begun: Pose
+    turned_rad: float = 0.0
+    last_yaw_rad: float = 0.0
+
+
+class Ladder:
+    """Climbs one rung each time the robot is stuck again; begins at the foot after progress."""
+
+    def __init__(self, config: RecoveryConfig) -> None:
+        self._config = config
+        self._next = Rung.REPLAN
+        self._rounds = 0
+        self._running: _Running | None = None
+
+    @property
+    def running(self) -> bool:
+        """True while a rung that moves the robot is under way."""
+        return self._running is not None
+
+    @property
+    def name(self) -> str:
+        """What is being tried."""
+        return "" if self._running is None else self._running.rung.name.lower().replace("_", " ")
+
+    @property
+    def exhausted(self) -> bool:
+        """True when the whole ladder has been climbed as often as allowed."""
+        return self._rounds >= self._config.attempts
+
+    def reset(self) -> None:
+        """Start from the foot: there was progress, or there is a new goal."""
+        self._next, self._rounds, self._running = Rung.REPLAN, 0, None
+
+    def climb(self, T_odom_base: Pose, now_s: float) -> Rung:
+        """Take the next rung; turning and backing off then run through `step`."""
+        rung = self._next
+        self._next = Rung((rung + 1) % len(Rung))
+        if rung == Rung.BLOCK:
+            self._rounds += 1
+        elif rung == Rung.TURN:
+            self._begin(rung, self._config.turn_s, np.inf, T_odom_base, now_s)
+        elif rung == Rung.BACK_OFF:
+            self.back_off(T_odom_base, now_s, self._config.back_off_m)
+        return rung
+
+    def back_off(self, T_odom_base: Pose, now_s: float, limit_m: float) -> None:
+        """Go back now, whatever rung is next (after a bump)."""
+        self._begin(Rung.BACK_OFF, self._config.back_off_s, limit_m, T_odom_base, now_s)
+
+    def _begin(self, rung: Rung, time_s: float, limit_m: float, T_odom_base: Pose, now_s: float) -> None:
+        self._running = _Running(
+            rung, now_s + time_s, limit_m, np.array(T_odom_base), 0.0, float(T_odom_base[2])
+        )
+
+    def step(self, T_odom_base: Pose, way_back: WayBack, now_s: float, *, room_behind: bool) -> Twist | None:
+        """Return the twist of the rung under way, or None when it has ended."""
+        run = self._running
+        if run is None:
+            return None
+        run.turned_rad += abs(float(se2.wrap_angle(T_odom_base[2] - run.last_yaw_rad)))
+        run.last_yaw_rad = float(T_odom_base[2])
+        moved_m = float(np.hypot(*(T_odom_base - run.T_odom_begun)[:2]))
+        over = now_s >= run.until_s or moved_m >= run.limit_m
+        if run.rung == Rung.TURN and run.turned_rad >= 2.0 * np.pi:
+            over = True
+        if run.rung == Rung.BACK_OFF and not room_behind:
+            over = True
+        if over:
+            self._running = None
+            return None
+        if run.rung == Rung.TURN:
+            return Twist(0.0, self._config.turn_radps)
+        return way_back.twist_back(T_odom_base, self._config.back_off_mps)

@@ -1,0 +1,113 @@
+"""The sliding goal: the furthest node of the route that lies in the window and is proved reachable in it.
+
+The goal slides along the route while the robot drives; nothing is cancelled and started again, so there is no
+stammer between nodes (thesis, 5-2-2 and Figure 5-13).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from lemtomap import se2
+from lemtomap.nav.metric import Reach
+from lemtomap.nav.route.planner import Route
+from lemtomap.nav.types import Goal
+from lemtomap.se2 import Pose
+
+BORDER_M = 0.4
+"""A node this near to the window's border has its surroundings cut off."""
+SNAP_M = 0.30
+"""A node's pose in the window may be off by this much; its place is looked for this near."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where in the window to steer, and which part of the route that covers."""
+
+    index: int
+    """Into the route's nodes."""
+    node_id: int
+    cell: tuple[int, int]
+    final: bool
+    """True: this is the goal itself."""
+    proven: bool
+    """True: over seen floor all the way."""
+
+
+@dataclass(frozen=True, slots=True)
+class Barrier:
+    """An edge of the route whose far end the window shows but cannot reach."""
+
+    index: int
+    """Of the edge in the route."""
+    edge_id: int
+    p_near_grid: tuple[float, float]
+    p_far_grid: tuple[float, float]
+
+
+def place_of(route: Route, index: int, goal: Goal, T_grid_node: Mapping[int, Pose]) -> Pose | None:
+    """Return the pose in the grid frame of the route's index-th node, or of the goal at its end."""
+    T_grid_here = T_grid_node.get(route.nodes[index])
+    if T_grid_here is None:
+        return None
+    if index < len(route.nodes) - 1:
+        return T_grid_here
+    return se2.compose(T_grid_here, [goal.p_node[0], goal.p_node[1], goal.yaw_node_rad or 0.0])
+
+
+def choose_target(
+    route: Route, goal: Goal, T_grid_node: Mapping[int, Pose], reach: Reach, goal_tolerance_m: float
+) -> Target | None:
+    """Return the furthest reachable place of the route, or None if not even the next node can be reached."""
+    last = len(route.nodes) - 1
+    unproven: Target | None = None
+    for index in range(last, -1, -1):
+        target = _target_at(index, route, goal, T_grid_node, reach, goal_tolerance_m)
+        if target is None:
+            continue
+        if target.proven and (index > 0 or last == 0 or unproven is None):
+            return target
+        if not target.proven and index > 0:
+            unproven = target
+        if not target.proven and last == 0:
+            return target
+    return unproven
+
+
+def find_barrier(
+    route: Route, goal: Goal, T_grid_node: Mapping[int, Pose], reach: Reach, beyond: int
+) -> Barrier | None:
+    """Return the first edge after route index `beyond` whose far end is in the window but out of reach."""
+    for index in range(beyond, len(route.nodes) - 1):
+        near = place_of(route, index, goal, T_grid_node)
+        far = place_of(route, index + 1, goal, T_grid_node)
+        if near is None or far is None or not reach.costs.holds(far, BORDER_M):
+            return None
+        if reach.nearest(far, SNAP_M) is None:
+            return Barrier(
+                index,
+                route.edges[index].edge_id,
+                (float(near[0]), float(near[1])),
+                (float(far[0]), float(far[1])),
+            )
+    return None
+
+
+def _target_at(
+    index: int,
+    route: Route,
+    goal: Goal,
+    T_grid_node: Mapping[int, Pose],
+    reach: Reach,
+    goal_tolerance_m: float,
+) -> Target | None:
+    place = place_of(route, index, goal, T_grid_node)
+    if place is None:
+        return None
+    final = index == len(route.nodes) - 1
+    border_m = 0.0 if final else BORDER_M
+    if not reach.costs.holds(place, border_m):
+        return None
+    found = reach.nearest(place, goal_tolerance_m if final else SNAP_M)
+    if found is None:
+        return None
+    return Target(index, route.nodes[index], found[:2], final, found[2] == 1)

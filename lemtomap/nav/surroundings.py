@@ -1,0 +1,87 @@
+"""What navigation believes stands around the robot: the costmap, the sensors' memories, touched hazards."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lemtomap import se2
+from lemtomap.nav.config import NavConfig
+from lemtomap.nav.costmap import Costmap, Costs
+from lemtomap.nav.motion.collision import points_now
+from lemtomap.nav.types import Contact, ContactKind, Points, Sighting
+from lemtomap.se2 import Pose
+from lemtomap.topo.events import Bumped
+from lemtomap.types import MapView
+
+FRESH_S = 0.6
+"""Range points older than this say nothing about what is in front of the body now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hazard:
+    """A place met by touch, kept in a node's frame so that it survives the window."""
+
+    node_id: int
+    p_node: tuple[float, float]
+    stamp_s: float
+
+
+class Surroundings:
+    """Takes windows, sightings and contacts; gives costmaps and raw points."""
+
+    def __init__(self, config: NavConfig) -> None:
+        self._config = config
+        self._costmap = Costmap(config.costmap, config.body)
+        self._sightings: dict[str, Sighting] = {}
+        self._hazards: list[Hazard] = []
+        self._ready = False
+
+    def remember(self, hazards: Sequence[Hazard]) -> None:
+        """Take hazards known from earlier runs."""
+        self._hazards.extend(hazards)
+
+    def take(self, map_view: MapView, sightings: Sequence[Sighting]) -> None:
+        """Take the newest window and what the sensors saw since the last call."""
+        self._costmap.follow_window(map_view.grid)
+        self._ready = True
+        for sighting in sightings:
+            last = self._sightings.get(sighting.source)
+            if last is None or sighting.stamp_s > last.stamp_s:
+                self._sightings[sighting.source] = sighting
+                self._costmap.see(sighting, map_view.T_grid_odom)
+
+    def touch(self, contact: Contact, map_view: MapView, T_grid_base: Pose) -> Bumped:
+        """Remember a contact, in the frame of the associated node, and return what the map is told."""
+        reach_m = self._config.body.radius_m + self._config.costmap.contact_radius_m
+        # A Kobuki's bumper tells one of three directions only, so a short arc is marked, not a point.
+        spread = (-0.3, 0.0, 0.3) if contact.kind == ContactKind.BUMPER else (0.0,)
+        bearings = contact.bearing_rad + np.array(spread)
+        p_base = reach_m * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+        T_grid_node = map_view.T_grid_node.get(map_view.associated_id)
+        if T_grid_node is not None:
+            for x, y in se2.transform(se2.between(T_grid_node, T_grid_base), p_base):
+                self._hazards.append(Hazard(map_view.associated_id, (float(x), float(y)), contact.stamp_s))
+        x, y = p_base[len(p_base) // 2]
+        return Bumped(contact.kind.value, float(x), float(y), contact.stamp_s)
+
+    def costs(self, map_view: MapView, T_grid_base: Pose, now_s: float) -> Costs:
+        """Return the costmap of this moment."""
+        memory_s = self._config.costmap.contact_memory_s
+        self._hazards = [hazard for hazard in self._hazards if now_s - hazard.stamp_s < memory_s]
+        placed = [
+            se2.transform(map_view.T_grid_node[hazard.node_id], hazard.p_node)
+            for hazard in self._hazards
+            if hazard.node_id in map_view.T_grid_node
+        ]
+        hazards_grid: Points = np.array(placed).reshape(-1, 2)
+        return self._costmap.build(now_s, hazards_grid, T_grid_base[:2])
+
+    def points(self, T_odom_base: Pose, now_s: float) -> Points:
+        """Return the raw range points near the body, present base frame, float64 (N, 2)."""
+        fresh = [s for s in self._sightings.values() if now_s - s.stamp_s < FRESH_S]
+        return points_now(fresh, T_odom_base)
+
+    def forget_live(self) -> None:
+        """Drop live obstacles; walls and hazards stay."""
+        self._costmap.forget_live()

@@ -1,0 +1,155 @@
+"""What navigation takes in and gives out, beside the types all of LEMTOMap shares."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose
+from lemtomap.topo.events import NavEvent
+from lemtomap.types import Scan, Twist
+
+Points = NDArray[np.float64]
+"""float64 (N, 2), metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A place to go: a node, or a point (and heading) given in a node's own frame."""
+
+    node_id: int
+    p_node: tuple[float, float] = (0.0, 0.0)
+    """Metres, frame of the node."""
+    yaw_node_rad: float | None = None
+    """Heading to arrive with; None: any."""
+    tolerance_m: float | None = None
+    """None: NavConfig.goal_tolerance_m."""
+
+
+class NavState(StrEnum):
+    """What the navigator is doing now."""
+
+    IDLE = "idle"
+    TURNING = "turning"
+    """In place, because the way starts to the side or behind."""
+    DRIVING = "driving"
+    WAITING = "waiting"
+    """For somebody to make way, or for the pose to be found again."""
+    RECOVERING = "recovering"
+    ARRIVED = "arrived"
+    FAILED = "failed"
+
+
+class Reason(StrEnum):
+    """Why the navigator waits or gave up."""
+
+    NONE = ""
+    NO_ROUTE = "no route"
+    """The graph holds no open way from here to the goal."""
+    BLOCKED = "blocked"
+    """There is a route, but no way along it could be driven within the limits."""
+    LOST = "lost"
+    """The pose in the map is not known."""
+    OBSTACLE = "obstacle"
+    """Something that may go away stands in the way."""
+    CANCELLED = "cancelled"
+
+
+class ContactKind(StrEnum):
+    """Which sense met something the laser overlooked."""
+
+    BUMPER = "bump"
+    CLIFF = "cliff"
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A bumper was pressed or a cliff sensor fired."""
+
+    stamp_s: float
+    kind: ContactKind
+    bearing_rad: float
+    """Direction of the sensor in the base frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """What a range sensor saw at one moment: where rays ended, and rays that met nothing."""
+
+    stamp_s: float
+    T_odom_base: Pose
+    """Where the base was at that moment."""
+    hits_base: Points
+    """float64 (N, 2): ends of rays that met something, base frame."""
+    misses_base: Points
+    """float64 (M, 2): far ends of rays known to be free all along (+inf ranges), base frame."""
+    origin_base: tuple[float, float] = (0.0, 0.0)
+    """Where the rays start, base frame."""
+    source: str = "laser"
+    """Each source has its own obstacle layer: a laser ray never clears what a depth camera saw."""
+
+    @classmethod
+    def from_scan(cls, scan: Scan, T_odom_base: Pose, source: str = "laser") -> "Sighting":
+        """Read a scan: NaN and out-of-range values say nothing, +inf says free up to the range limit."""
+        ranges = np.asarray(scan.ranges_m, dtype=np.float64)
+        angles = scan.angle_min_rad + scan.angle_step_rad * np.arange(ranges.size) + scan.T_base_laser[2]
+        hit = np.isfinite(ranges) & (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)
+        miss = np.isposinf(ranges)
+        directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        origin = np.asarray(scan.T_base_laser[:2], dtype=np.float64)
+        return cls(
+            stamp_s=scan.stamp_s,
+            T_odom_base=T_odom_base,
+            hits_base=origin + directions[hit] * ranges[hit, None],
+            misses_base=origin + directions[miss] * scan.range_max_m,
+            origin_base=(float(origin[0]), float(origin[1])),
+            source=source,
+        )
+
+    @classmethod
+    def from_points(
+        cls, stamp_s: float, T_odom_base: Pose, hits_base: NDArray[np.floating], source: str = "laser"
+    ) -> "Sighting":
+        """Take bare hit points (N, 2) in the base frame; rows that are not finite are dropped."""
+        hits = np.asarray(hits_base, dtype=np.float64).reshape(-1, 2)
+        hits = hits[np.isfinite(hits).all(axis=1)]
+        return cls(stamp_s, T_odom_base, hits, np.empty((0, 2)), source=source)
+
+
+@dataclass(frozen=True, slots=True)
+class CostmapView:
+    """Immutable picture of the costmap, in the grid frame, for viewers."""
+
+    stamp_s: float
+    cost: NDArray[np.uint8]
+    """uint8 (rows, cols): 0 free .. 252 close to something, 253 too close for the body, 254 obstacle,
+    255 unknown."""
+    resolution_m: float
+    origin_m: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class NavOutput:
+    """One navigation cycle's result."""
+
+    stamp_s: float
+    twist: Twist
+    """What the robot should do now; zero unless driving."""
+    state: NavState
+    reason: Reason = Reason.NONE
+    text: str = ""
+    """One line for a person: what it does, or why it cannot."""
+    goal: Goal | None = None
+    route: tuple[int, ...] = ()
+    """Node ids from the associated node to the goal."""
+    target_id: int | None = None
+    """The route's node the robot is steering for: the furthest one the window proves reachable."""
+    remaining_m: float = 0.0
+    expected_s: float = 0.0
+    local_path_grid: Points = field(default_factory=lambda: np.empty((0, 2)))
+    """float64 (N, 2), metres, grid frame."""
+    costmap: CostmapView | None = None
+    events: Sequence[NavEvent] = ()
+    cycle: int = 0
