@@ -3,7 +3,7 @@
     python -m sim.serve --world office
 
 The first line of output is {"kobuki": "/dev/pts/3", "hokuyo": "/dev/pts/4"}; it serves until interrupted. Its
-last line is the truth of the run: {"path_m": ..., "contacts": ..., "contact_s": ..., "pose": [x, y, yaw], ...}.
+last line is the truth of the run: {"path_m": ..., "contacts": ..., "contact_s": ..., "pose": [x, y, yaw]}.
 """
 
 import argparse
