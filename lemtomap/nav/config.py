@@ -97,3 +97,21 @@ class NavConfig:
     yaw_tolerance_rad: float = 0.10
     turn_start_rad: float = 1.05  # turn in place when the way starts further off than this (60 degrees)
     turn_end_rad: float = 0.30
+
+
+@dataclass(frozen=True, slots=True)
+class ExploreConfig:
+    """When an opening is worth a visit, and when exploration is over."""
+
+    period_s: float = 0.5
+    least_size_m: float = 0.25  # a 0.8 m door leaves 0.4 m to the middle of a Kobuki
+    least_unknown_m2: float = 0.10  # smaller dark patches are gaps between beams
+    goal_tolerance_m: float = 0.40
+    switch_share: float = 0.5  # another opening must cost less than this share of the present one's
+    turn_price_m: float = 1.0  # turning right round costs about this much way
+    window_first_m: float = 6.0  # look for openings beyond the window when none in it is nearer than this
+    patience_s: float = 240.0
+    pause_s: float = 60.0  # an opening that failed is left alone this long
+    attempts: int = 2
+    linger_s: float = 1.5  # having arrived, the mapper gets this long to see
+    sure_looks: int = 4  # looks without any opening before saying that all is explored

@@ -72,7 +72,7 @@ def plan_to(costs: Costs, p_robot_grid: ArrayLike, target_cell: tuple[int, int])
     stop = int(np.floor(row)) * cols + int(np.floor(col))
     seeds = np.array([target_cell[0] * cols + target_cell[1]], dtype=np.int64)
     margin = FIELD_MARGIN_M / costs.resolution_m
-    top = _top_cost(costs)
+    top = top_cost(costs)
     field = kernels.march(costs.cost, seeds, np.zeros(1), stop, margin, top)
     if not np.isfinite(field[int(np.floor(row)), int(np.floor(col))]):
         return None
@@ -82,6 +82,7 @@ def plan_to(costs: Costs, p_robot_grid: ArrayLike, target_cell: tuple[int, int])
     return MetricPlan(costs, field, path, length, (float(target[0]), float(target[1])))
 
 
-def _top_cost(costs: Costs) -> float:
+def top_cost(costs: Costs) -> float:
+    """Return the largest finite price of a cell."""
     finite = costs.cost[np.isfinite(costs.cost)]
     return float(max(TIGHT_COST, finite.max() if finite.size else 1.0))

@@ -114,6 +114,36 @@ class World:
             lost=self.lost,
         )
 
+    def reveal(self) -> None:
+        """Let the window learn what one scan shows, as a mapper would."""
+        scan = self.scan()
+        angles = scan.angle_min_rad + scan.angle_step_rad * np.arange(scan.ranges_m.size) + self.pose[2]
+        reach = np.arange(0.0, 5.6, 0.025)
+        lengths = np.where(np.isinf(scan.ranges_m), 5.6, scan.ranges_m + 0.05)
+        x = self.pose[0] + np.outer(np.cos(angles), reach)
+        y = self.pose[1] + np.outer(np.sin(angles), reach)
+        inside = reach[None, :] <= lengths[:, None]
+        r = np.clip((y[inside] / RES).astype(int), 0, self.walls.shape[0] - 1)
+        c = np.clip((x[inside] / RES).astype(int), 0, self.walls.shape[1] - 1)
+        self.known[r, c] = True
+
+    def grow(self) -> None:
+        """Put a node where none is near, joined to the one the robot comes from."""
+        places = self.graph.places
+        near = min(places, key=lambda n: np.hypot(*np.subtract(places[n], self.pose[:2])))
+        if np.hypot(*np.subtract(places[near], self.pose[:2])) > 1.0:
+            new = max(places) + 1
+            places[new] = (float(self.pose[0]), float(self.pose[1]))
+            self.graph.links.append((100 + len(self.graph.links), near, new))
+            self.graph.version += 1
+
+    def forget_far(self, reach_m: float) -> None:
+        """Lose what lies further away than a window would hold."""
+        rows, cols = np.nonzero(self.known)
+        x, y = (cols + 0.5) * RES, (rows + 0.5) * RES
+        far = np.maximum(np.abs(x - self.pose[0]), np.abs(y - self.pose[1])) > reach_m
+        self.known[rows[far], cols[far]] = False
+
     def sighting(self) -> Sighting:
         return Sighting.from_scan(self.scan(), self.T_odom_base)
 

@@ -1,0 +1,243 @@
+"""Exploration: goal after goal at unexplored openings, until none is left; says what stayed closed."""
+
+import heapq
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lemtomap import se2
+from lemtomap.nav import kernels
+from lemtomap.nav.config import ExploreConfig, NavConfig
+from lemtomap.nav.costmap import Costmap
+from lemtomap.nav.explore.frontier import Opening, find_openings, frontier_points
+from lemtomap.nav.explore.memory import SeenMemory
+from lemtomap.nav.explore.openings import Openings
+from lemtomap.nav.metric import Reach, reach_from, top_cost
+from lemtomap.nav.types import Goal, NavOutput, NavState
+from lemtomap.se2 import Pose
+from lemtomap.topo.events import NavEvent
+from lemtomap.topo.graph import OpeningState, Placeholder
+from lemtomap.types import MapView, RouteGraph
+
+
+@dataclass(frozen=True, slots=True)
+class ExploreOutput:
+    """What exploration wants now."""
+
+    goal: Goal | None
+    """A new goal for the navigator; None: go on with the present one."""
+    done: bool
+    text: str
+    openings: tuple[Placeholder, ...] = ()
+    closed: tuple[Placeholder, ...] = ()
+    """Openings that could not be reached."""
+    events: Sequence[NavEvent] = ()
+
+
+@dataclass(slots=True)
+class _Pursuit:
+    number: int
+    goal: Goal
+    since_s: float
+    arrived_s: float | None = field(default=None)
+
+
+class Explorer:
+    """Keeps the openings; picks the one that costs least to reach. Owned by the navigation thread."""
+
+    def __init__(
+        self,
+        config: ExploreConfig | None = None,
+        nav: NavConfig | None = None,
+        known: Iterable[Placeholder] = (),
+    ) -> None:
+        self.config = config or ExploreConfig()
+        self._nav = nav or NavConfig()
+        self._costmap = Costmap(self._nav.costmap, self._nav.body)
+        self._memory = SeenMemory()
+        self._openings = Openings(known)
+        self._pursuit: _Pursuit | None = None
+        self._looked_s = -np.inf
+        self._empty_looks = 0
+        self._output = ExploreOutput(None, done=False, text="looking around")
+
+    def step(
+        self,
+        map_view: MapView,
+        graph: RouteGraph,
+        navigation: NavOutput | None,
+        T_odom_base: Pose,
+        now_s: float,
+    ) -> ExploreOutput:
+        """Take the newest map and what the navigator does; return a goal now and then, at last `done`.
+
+        navigation: the navigator's last output, None before the first.
+        """
+        if self._output.done or map_view.lost or now_s - self._looked_s < self.config.period_s - 1e-6:
+            return ExploreOutput(None, self._output.done, self._output.text, *self._lists())
+        self._looked_s = now_s
+        T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
+        reach = self._look(map_view, T_grid_base)
+        self._judge(navigation, now_s)
+        goal = self._choose(map_view, graph, reach, T_grid_base, now_s)
+        self._empty_looks = 0 if self._openings.ready(now_s) else self._empty_looks + 1
+        done = self._empty_looks >= self.config.sure_looks
+        self._output = ExploreOutput(
+            goal, done, self._text(done), *self._lists(), self._openings.take_events()
+        )
+        return self._output
+
+    def _look(self, map_view: MapView, T_grid_base: Pose) -> Reach:
+        """Find the openings of the window, leave out forgotten ones, and join them with the known."""
+        config = self.config
+        self._costmap.follow_window(map_view.grid)
+        costs = self._costmap.build(map_view.stamp_s, np.empty((0, 2)), T_grid_base[:2])
+        reach = reach_from(costs, T_grid_base)
+        self._memory.take(costs, map_view.T_grid_node, T_grid_base)
+        skip = np.zeros(costs.state.shape, dtype=np.uint8)
+        rows, cols = frontier_points(reach, config.least_unknown_m2)
+        points_grid = costs.to_grid(np.stack([rows + 0.5, cols + 0.5], axis=-1))
+        skip[rows, cols] = self._memory.seen(points_grid, map_view.T_grid_node)
+        openings: list[Opening] = find_openings(reach, config.least_size_m, config.least_unknown_m2, skip)
+        self._openings.match(openings, map_view.T_grid_node, costs)
+        return reach
+
+    def _judge(self, navigation: NavOutput | None, now_s: float) -> None:
+        """Learn from how the pursuit went: explored, failed, or reached and nothing more to see."""
+        pursuit = self._pursuit
+        if pursuit is None:
+            return
+        if self._openings.get(pursuit.number) is None:
+            self._pursuit = None
+            return
+        mine = navigation is not None and navigation.stamp_s > pursuit.since_s
+        if not mine or navigation is None:
+            return
+        late = now_s - pursuit.since_s > self.config.patience_s
+        if navigation.state == NavState.FAILED or late:
+            self._openings.failed(
+                pursuit.number, now_s, pause_s=self.config.pause_s, attempts=self.config.attempts
+            )
+            self._pursuit = None
+        elif navigation.state == NavState.ARRIVED:
+            pursuit.arrived_s = now_s if pursuit.arrived_s is None else pursuit.arrived_s
+            if now_s - pursuit.arrived_s > self.config.linger_s:
+                self._openings.spend(pursuit.number)
+                self._pursuit = None
+
+    def _choose(
+        self, map_view: MapView, graph: RouteGraph, reach: Reach, T_grid_base: Pose, now_s: float
+    ) -> Goal | None:
+        """Return a new goal if another opening is to be pursued, or the pursued one has moved."""
+        ready = self._openings.ready(now_s)
+        lingering = self._pursuit is not None and self._pursuit.arrived_s is not None
+        if not ready or lingering:
+            return None
+        prices = self._prices(ready, map_view, graph, reach, T_grid_base)
+        if not prices:
+            attempts = self.config.attempts
+            for placeholder in ready:
+                self._openings.failed(placeholder.placeholder_id, now_s, pause_s=0.0, attempts=attempts)
+            return None
+        number = min(prices, key=lambda n: prices[n])
+        pursued = None if self._pursuit is None else prices.get(self._pursuit.number)
+        if self._pursuit is not None and pursued is not None:
+            number = number if prices[number] < self.config.switch_share * pursued else self._pursuit.number
+        return self._pursue(next(p for p in ready if p.placeholder_id == number), now_s)
+
+    def _pursue(self, opening: Placeholder, now_s: float) -> Goal | None:
+        """Return the goal at an opening if the navigator is not on its way there already."""
+        goal = Goal(opening.node_id, (opening.x_m, opening.y_m), None, self.config.goal_tolerance_m)
+        pursuit = self._pursuit
+        if pursuit is None or pursuit.number != opening.placeholder_id:
+            self._pursuit = _Pursuit(opening.placeholder_id, goal, now_s)
+            return goal
+        if _same_place(pursuit.goal, goal):
+            return None
+        pursuit.goal = goal
+        return goal
+
+    def _prices(
+        self,
+        ready: Sequence[Placeholder],
+        map_view: MapView,
+        graph: RouteGraph,
+        reach: Reach,
+        T_grid_base: Pose,
+    ) -> dict[int, float]:
+        """Return the price in metres of way of each opening within reach, in the window or by route."""
+        costs = reach.costs
+        row, col = costs.cell(T_grid_base)
+        start = np.array([int(row) * costs.state.shape[1] + int(col)], dtype=np.int64)
+        field_cells = kernels.march(costs.cost, start, np.zeros(1), -1, 0.0, top_cost(costs))
+        prices: dict[int, float] = {}
+        away: list[Placeholder] = []
+        for placeholder in ready:
+            price_m = self._price_in_window(placeholder, map_view, reach, field_cells, T_grid_base)
+            if price_m is None:
+                away.append(placeholder)
+            else:
+                prices[placeholder.placeholder_id] = price_m
+        if away and (not prices or min(prices.values()) > self.config.window_first_m):
+            prices.update(_price_by_route(away, graph, map_view.associated_id))
+        return prices
+
+    def _price_in_window(
+        self,
+        placeholder: Placeholder,
+        map_view: MapView,
+        reach: Reach,
+        field_cells: np.ndarray,
+        T_grid_base: Pose,
+    ) -> float | None:
+        T_grid_node = map_view.T_grid_node.get(placeholder.node_id)
+        if T_grid_node is None:
+            return None
+        place = se2.transform(T_grid_node, [placeholder.x_m, placeholder.y_m])
+        if not reach.costs.holds(place):
+            return None
+        found = reach.nearest(place, self.config.goal_tolerance_m)
+        if found is None:
+            return None
+        way_m = float(field_cells[found[0], found[1]]) * reach.costs.resolution_m
+        dx, dy = place - T_grid_base[:2]
+        turn_rad = abs(float(se2.wrap_angle(np.arctan2(dy, dx) - T_grid_base[2])))
+        return way_m + self.config.turn_price_m * turn_rad / np.pi if np.isfinite(way_m) else None
+
+    def _lists(self) -> tuple[tuple[Placeholder, ...], tuple[Placeholder, ...]]:
+        state = self._openings.of_state
+        return tuple(state(OpeningState.OPEN)), tuple(state(OpeningState.CLOSED))
+
+    def _text(self, done: bool) -> str:  # noqa: FBT001 - says itself
+        opened, closed = self._lists()
+        if done:
+            return f"explored everything; {len(closed)} openings stayed closed"
+        return f"{len(opened)} openings to explore, {len(closed)} closed"
+
+
+def _same_place(a: Goal, b: Goal) -> bool:
+    return a.node_id == b.node_id and float(np.hypot(*np.subtract(a.p_node, b.p_node))) < 0.25
+
+
+def _price_by_route(openings: Sequence[Placeholder], graph: RouteGraph, start_id: int) -> dict[int, float]:
+    """Return the price of the one opening outside the window that is nearest along the edges."""
+    wanted: dict[int, list[Placeholder]] = {}
+    for placeholder in openings:
+        wanted.setdefault(placeholder.node_id, []).append(placeholder)
+    best = {start_id: 0.0}
+    heap = [(0.0, start_id)]
+    settled: set[int] = set()
+    while heap:
+        way_m, node_id = heapq.heappop(heap)
+        if node_id in settled:
+            continue
+        settled.add(node_id)
+        if node_id in wanted:
+            return {p.placeholder_id: way_m + float(np.hypot(p.x_m, p.y_m)) for p in wanted[node_id]}
+        for edge in graph.edges_of(node_id):
+            further_m = way_m + edge.length_m
+            if further_m < best.get(edge.other_id, np.inf):
+                best[edge.other_id] = further_m
+                heapq.heappush(heap, (further_m, edge.other_id))
+    return {}

@@ -1,0 +1,68 @@
+"""Unexplored openings of the window: where reachable, seen floor borders on a patch of unseen floor."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.nav.explore import kernels
+from lemtomap.nav.metric import Reach
+
+JOIN_CELLS = 2
+"""Frontier cells this near to each other belong to one opening."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """One opening seen in the window now."""
+
+    p_grid: tuple[float, float]
+    """Metres: the frontier cell nearest to the middle of the opening."""
+    yaw_grid_rad: float
+    """Towards the unknown."""
+    size_m: float
+
+
+def find_openings(
+    reach: Reach, least_size_m: float, least_unknown_m2: float, skip: NDArray[np.uint8] | None = None
+) -> list[Opening]:
+    """Return the openings of the window. skip: uint8 (rows, cols), 1 where frontier cells do not count."""
+    costs = reach.costs
+    res = costs.resolution_m
+    large = kernels.large_unknown(costs.state, max(1, round(least_unknown_m2 / res**2)))
+    mask = kernels.frontier_cells(reach.level, large)
+    if skip is not None:
+        mask[skip == 1] = 0
+    label = np.zeros(mask.shape, dtype=np.int32)
+    count = kernels.label_clusters(mask, label, JOIN_CELLS)
+    rows, cols = np.nonzero(label)
+    of = label[rows, cols]
+    found = []
+    for number in range(1, count + 1):
+        members = of == number
+        size_m = float(members.sum()) * res
+        if size_m < least_size_m:
+            continue
+        found.append(_opening(rows[members], cols[members], size_m, large, reach))
+    return found
+
+
+def frontier_points(reach: Reach, least_unknown_m2: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and cols of all frontier cells."""
+    res = reach.costs.resolution_m
+    large = kernels.large_unknown(reach.costs.state, max(1, round(least_unknown_m2 / res**2)))
+    rows, cols = np.nonzero(kernels.frontier_cells(reach.level, large))
+    return rows, cols
+
+
+def _opening(
+    rows: NDArray[np.intp], cols: NDArray[np.intp], size_m: float, large: NDArray[np.uint8], reach: Reach
+) -> Opening:
+    costs = reach.costs
+    middle = np.argmin(np.hypot(rows - rows.mean(), cols - cols.mean()))
+    row, col = int(rows[middle]), int(cols[middle])
+    r0, c0 = max(0, row - 6), max(0, col - 6)
+    dark_rows, dark_cols = np.nonzero(large[r0 : row + 7, c0 : col + 7])
+    dy, dx = (dark_rows + r0 - row).sum(), (dark_cols + c0 - col).sum()
+    place = costs.to_grid(np.array([[row + 0.5, col + 0.5]]))[0]
+    return Opening((float(place[0]), float(place[1])), float(np.arctan2(dy, dx)), size_m)

@@ -1,0 +1,140 @@
+"""Placeholders: openings kept in the frames of nodes, so that they outlive the window (thesis, 7-2)."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lemtomap import se2
+from lemtomap.nav.costmap import Costs
+from lemtomap.nav.explore.frontier import Opening
+from lemtomap.se2 import Pose
+from lemtomap.topo.events import NavEvent, OpeningDone, OpeningSeen
+from lemtomap.topo.graph import OpeningState, Placeholder
+
+SAME_M = 1.0
+"""An opening this near to a known one is that one: it recedes while the robot comes nearer."""
+NEWS_M = 0.3
+"""The map is told again when an opening moved by this much."""
+
+
+@dataclass(slots=True)
+class _Kept:
+    placeholder: Placeholder
+    told: Placeholder | None = None
+    failures: int = 0
+    not_before_s: float = 0.0
+
+
+class Openings:
+    """All placeholders, and the events that keep the topological map's copy up to date."""
+
+    def __init__(self, known: Iterable[Placeholder] = ()) -> None:
+        self._kept = {p.placeholder_id: _Kept(p, p) for p in known if p.state != OpeningState.EXPLORED}
+        self._next_id = 1 + max(self._kept, default=0)
+        self._events: list[NavEvent] = []
+
+    def take_events(self) -> list[NavEvent]:
+        """Return what the map is to be told since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    def of_state(self, state: OpeningState) -> list[Placeholder]:
+        """Return the placeholders in one state."""
+        return [kept.placeholder for kept in self._kept.values() if kept.placeholder.state == state]
+
+    def ready(self, now_s: float) -> list[Placeholder]:
+        """Return the open placeholders worth trying now; lately failed ones only when no other is left."""
+        unclosed = [k for k in self._kept.values() if k.placeholder.state == OpeningState.OPEN]
+        fresh = [k for k in unclosed if k.not_before_s <= now_s]
+        return [kept.placeholder for kept in fresh or unclosed]
+
+    def get(self, placeholder_id: int) -> Placeholder | None:
+        """Return a placeholder that is still kept."""
+        kept = self._kept.get(placeholder_id)
+        return None if kept is None else kept.placeholder
+
+    def match(self, seen: Sequence[Opening], T_grid_node: Mapping[int, Pose], costs: Costs) -> None:
+        """Join the openings seen now with those known; drop known ones that turn out explored."""
+        places = {
+            number: se2.transform(T_grid_node[kept.placeholder.node_id], _point(kept.placeholder))
+            for number, kept in self._kept.items()
+            if kept.placeholder.node_id in T_grid_node
+        }
+        free = dict(places)
+        for opening in sorted(seen, key=lambda o: -o.size_m):
+            number = _nearest(opening.p_grid, free)
+            if number is not None:
+                del free[number]
+            elif _nearest(opening.p_grid, places) is not None:
+                continue  # a second piece of an opening already matched
+            self._keep(number, opening, T_grid_node)
+        for number, place in free.items():
+            kept = self._kept[number]
+            if kept.placeholder.state == OpeningState.OPEN and _surroundings_known(costs, place):
+                self.done(number, closed=False)
+
+    def _keep(self, number: int | None, opening: Opening, T_grid_node: Mapping[int, Pose]) -> None:
+        """Attach an opening to the node nearest to it, under its old number or a new one."""
+        state = OpeningState.OPEN if number is None else self._kept[number].placeholder.state
+        if number is None:
+            number, self._next_id = self._next_id, self._next_id + 1
+        node_id = min(T_grid_node, key=lambda n: float(np.hypot(*(T_grid_node[n][:2] - opening.p_grid))))
+        x, y, yaw = se2.between(T_grid_node[node_id], [*opening.p_grid, opening.yaw_grid_rad])
+        placeholder = Placeholder(number, node_id, float(x), float(y), float(yaw), opening.size_m, state)
+        kept = self._kept.setdefault(number, _Kept(placeholder))
+        kept.placeholder = placeholder
+        told = kept.told
+        moved = told is None or told.node_id != node_id or np.hypot(told.x_m - x, told.y_m - y) > NEWS_M
+        if moved:
+            kept.told = placeholder
+            self._events.append(OpeningSeen(number, node_id, float(x), float(y), float(yaw), opening.size_m))
+
+    def failed(self, number: int, now_s: float, *, pause_s: float, attempts: int) -> None:
+        """An opening could not be reached: leave it for a while, or for good."""
+        kept = self._kept.get(number)
+        if kept is None:
+            return
+        kept.failures += 1
+        kept.not_before_s = now_s + pause_s
+        if kept.failures >= attempts:
+            self.done(number, closed=True)
+
+    def spend(self, number: int) -> None:
+        """There is nothing more to see from an opening: remember it, so that it is not found again."""
+        kept = self._kept.get(number)
+        if kept is not None:
+            self._events.append(OpeningDone(number, closed=False))
+            kept.placeholder = replace(kept.placeholder, state=OpeningState.EXPLORED)
+
+    def done(self, number: int, *, closed: bool) -> None:
+        """An opening was explored, or is closed for good."""
+        kept = self._kept.get(number)
+        if kept is None:
+            return
+        self._events.append(OpeningDone(number, closed))
+        if closed:
+            kept.placeholder = replace(kept.placeholder, state=OpeningState.CLOSED)
+        else:
+            del self._kept[number]
+
+
+def _point(placeholder: Placeholder) -> tuple[float, float]:
+    return placeholder.x_m, placeholder.y_m
+
+
+def _nearest(p_grid: tuple[float, float], places: Mapping[int, np.ndarray]) -> int | None:
+    if not places:
+        return None
+    number = min(places, key=lambda n: float(np.hypot(*(places[n] - p_grid))))
+    return number if np.hypot(*(places[number] - p_grid)) <= SAME_M else None
+
+
+def _surroundings_known(costs: Costs, p_grid: np.ndarray) -> bool:
+    """Tell whether a place lies well inside the window and is seen floor now."""
+    if not costs.holds(p_grid, 0.5):
+        return False
+    row, col = costs.cell(p_grid)
+    r, c = int(row), int(col)
+    patch = costs.state[r - 3 : r + 4, c - 3 : c + 4]
+    return bool((patch == 1).mean() < 0.5)

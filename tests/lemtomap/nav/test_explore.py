@@ -1,0 +1,62 @@
+"""Exploration in the small kinematic world, through a window that learns and forgets."""
+
+import numpy as np
+import pytest
+
+from lemtomap.nav.explore.explorer import Explorer
+from lemtomap.nav.navigator import Navigator
+from lemtomap.topo.events import OpeningDone, OpeningSeen
+from tests.lemtomap.nav.world import RES, Graph, World
+
+
+def office() -> World:
+    """A corridor with three rooms on each side, one of them shut."""
+    world = World(13.0, 8.0, Graph.of({1: (1.0, 4.0)}, []), pose=(1.0, 4.0, 0.0))
+    for y in (3.2, 4.7):
+        world.box(0, y, 13.0, y + 0.1)
+    for x in (4.3, 8.7):
+        world.box(x, 0, x + 0.1, 3.2)
+        world.box(x, 4.8, x + 0.1, 8.0)
+    for x in (2.0, 6.5, 10.5):
+        world.box(x, 3.2, x + 0.9, 3.3, value=False)
+    for x in (2.5, 11.0):
+        world.box(x, 4.7, x + 0.9, 4.8, value=False)
+    world.known[:] = False
+    return world
+
+
+def explore(world: World, seconds: float, window_m: float):
+    navigator, explorer = Navigator(), Explorer()
+    output, events, seen = None, [], np.zeros_like(world.known)
+    for _ in range(int(seconds / 0.1)):
+        world.reveal()
+        seen |= world.known
+        world.forget_far(window_m)
+        world.grow()
+        view = world.view()
+        wish = explorer.step(view, world.graph, output, world.T_odom_base, world.now_s)
+        events.extend(wish.events)
+        if wish.done:
+            break
+        if wish.goal is not None:
+            navigator.set_goal(wish.goal, world.now_s)
+        output = navigator.step(
+            view, world.graph, world.T_odom_base, world.twist, world.sighting(), (), world.now_s
+        )
+        world.drive(output.twist)
+    return wish, events, seen
+
+
+@pytest.mark.parametrize("window_m", [20.0])
+def test_explores_the_whole_office_and_ends_by_itself(window_m):
+    world = office()
+    wish, events, seen = explore(world, 400.0, window_m)
+    assert wish.done, wish.text
+    floor = np.zeros_like(seen)
+    floor[:, :] = ~world.walls
+    floor[round(4.7 / RES) :, round(4.35 / RES) : round(8.75 / RES)] = False  # the shut room
+    assert seen[floor].mean() > 0.97
+    assert world.contacts == 0
+    born = {event.placeholder_id for event in events if isinstance(event, OpeningSeen)}
+    gone = {event.placeholder_id for event in events if isinstance(event, OpeningDone)}
+    assert born == gone
