@@ -1,7 +1,9 @@
 # Each target sets up what it needs: a fresh machine with Python >= 3.11 is enough.
-PYTHON ?= python3
 VENV := .venv
 STAMP := $(VENV)/.installed
+FITS := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
+PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
+	$$p -c "$(FITS)" 2>/dev/null && echo $$p && break; done)
 
 .PHONY: demo test check clean
 
@@ -12,6 +14,7 @@ test: $(STAMP)  ## every check and every test
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" tools/check.sh
 
 $(STAMP): pyproject.toml
+	@test -n "$(PYTHON)" || { echo "needs Python 3.11 or newer with venv (Debian: apt install python3-venv)"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	touch $@

@@ -15,6 +15,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from lemtomap.nav.types import CostmapView
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, GridView, MapView, Twist
 from robot.viewer_layout import ABOUT, EDGE_COLOURS, blueprint
@@ -29,6 +30,22 @@ Z_COSTMAP, Z_EDGES, Z_NODES, Z_ROUTE, Z_SCAN = (
     0.09,
     0.12,
 )  # m above the floor, bottom to top
+
+
+def _cost_colours() -> NDArray[np.uint8]:
+    """Return RGBA for each cost of CostmapView: yellow to red, then too close, obstacle, unknown."""
+    cost = np.arange(256)
+    colours = np.zeros((256, 4), np.uint8)
+    near = (cost >= 1) & (cost <= 252)
+    share = cost[near] / 252.0
+    colours[near] = np.stack(
+        [np.full(share.size, 250), 200 - 150 * share, 60 - 40 * share, 20 + 150 * share], axis=-1
+    ).astype(np.uint8)
+    colours[253], colours[254] = (214, 40, 90, 190), (90, 0, 60, 255)
+    return colours
+
+
+COST_COLOURS = _cost_colours()
 
 
 @dataclass(frozen=True)
@@ -62,7 +79,7 @@ class Viewer:
         """Show the window, the graph near the robot, the particles and the map's own figures."""
         self._at(now_s)
         if self._is_due("window", now_s, self._config.window_hz):
-            self._log_grid("grid/window", view.grid, rr.components.Colormap.RvizMap, 0.0, 1.0)
+            self._log_window(view.grid)
             self._log_graph(view)
         if self._is_due("quality", now_s, self._config.plot_hz):
             self._stream.log("quality", rr.Scalars([view.quality, view.diversity]))
@@ -90,7 +107,7 @@ class Viewer:
         state: str,
         route_grid: PATHS,
         path_grid: PATHS,
-        costmap: GridView | None = None,
+        costmap: CostmapView | None = None,
     ) -> None:
         """Show navigation: its state, the route over nodes and the way to the sliding goal, (N, 2) metres."""
         self._at(now_s)
@@ -103,7 +120,7 @@ class Viewer:
             ends = path_grid[-1:] if len(path_grid) else path_grid
             self._stream.log("grid/plan/goal", rr.Points3D(_lift(ends, Z_SCAN)))
         if costmap is not None and self._is_due("costmap", now_s, self._config.window_hz):
-            self._log_grid("grid/costmap", costmap, rr.components.Colormap.Costmap, Z_COSTMAP, 0.35)
+            self._log_costmap(costmap)
 
     def show_velocity(self, now_s: float, wanted: Twist, sent: Twist, measured: Twist) -> None:
         """Plot what navigation wanted, what the safety gate let through and what the wheels did."""
@@ -164,21 +181,30 @@ class Viewer:
             colours = [[255, 183, 3], [42, 157, 143], [69, 123, 157]][: len(names)]
             log(path, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)), static=True)
 
-    def _log_grid(
-        self, path: str, grid: GridView, colormap: rr.components.Colormap, z: float, opacity: float
-    ) -> None:
-        """Log an occupancy grid or costmap where it lies in the grid frame."""
+    def _log_window(self, grid: GridView) -> None:
+        """Log the occupancy window where it lies in the grid frame."""
         rows, cols = grid.occupancy.shape
-        image = rr.components.ImageFormat(width=cols, height=rows, color_model="L", channel_datatype="U8")
-        grid_map = rr.GridMap(
+        window = rr.GridMap(
             data=np.flipud(grid.occupancy).tobytes(),
-            format=image,
+            format=rr.components.ImageFormat(width=cols, height=rows, color_model="L", channel_datatype="U8"),
             cell_size=grid.resolution_m,
-            translation=[*grid.origin_m, z],
-            opacity=opacity,
-            colormap=colormap,
+            translation=[*grid.origin_m, 0.0],
+            colormap=rr.components.Colormap.RvizMap,
         )
-        self._stream.log(path, grid_map)
+        self._stream.log("grid/window", window)
+
+    def _log_costmap(self, costmap: CostmapView) -> None:
+        """Log the costmap as a veil over the window: clear where driving is free or nothing is known."""
+        rows, cols = costmap.cost.shape
+        veil = rr.GridMap(
+            data=np.flipud(COST_COLOURS[costmap.cost]).tobytes(),
+            format=rr.components.ImageFormat(
+                width=cols, height=rows, color_model="RGBA", channel_datatype="U8"
+            ),
+            cell_size=costmap.resolution_m,
+            translation=[*costmap.origin_m, Z_COSTMAP],
+        )
+        self._stream.log("grid/costmap", veil)
 
     def _log_graph(self, view: MapView) -> None:
         """Log nodes with their names, the associated one in its own colour, and edges by type."""
