@@ -43,6 +43,15 @@ class BaseConfig:
     battery: BatteryConfig = field(default_factory=BatteryConfig)
 
 
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """What the last packet said, when, and what was true then."""
+
+    stamp_s: float
+    readings: BaseReadings
+    state: BodyState
+
+
 class Base:
     """The base among the things of a scene."""
 
@@ -54,6 +63,7 @@ class Base:
         self.body = Body(scene, world.spawn, config.body, body_rng, flat=world.flat)
         self.gyro = Gyro(config.gyro, gyro_rng)
         self.firmware = KobukiFirmware(config.firmware)
+        self.last: Sent | None = None
         self.buttons = 0
         """Touch keys held down now: 1, 2, 4."""
         self.lifted = False
@@ -73,7 +83,9 @@ class Base:
         if due > now_s:
             return b""
         state = before.towards(self.body.state, 1.0 - (now_s - due) / dt_s)
-        packet = self.firmware.packet(self._readings(state))
+        readings = self._readings(state)
+        self.last = Sent(due, readings, state)
+        packet = self.firmware.packet(readings)
         self._packets += 1
         return packet
 

@@ -90,7 +90,7 @@ def _draw(occupied: NDArray[np.bool_], box: Box, origin: tuple[float, float], st
     ys = origin[1] + (np.arange(row0, row1) + 0.5) * step - box.centre[1]
     gx, gy = np.meshgrid(xs, ys)
     cos, sin = np.cos(box.yaw_rad), np.sin(box.yaw_rad)
-    slack = step / 2  # thin legs must not fall between cell centres
+    slack = step / 2 + 1e-6  # thin legs must not fall between cell centres
     along, across = np.abs(cos * gx + sin * gy), np.abs(-sin * gx + cos * gy)
     occupied[row0:row1, col0:col1] |= (along <= max(box.half[0], slack)) & (across <= max(box.half[1], slack))
 

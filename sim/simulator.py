@@ -36,6 +36,16 @@ class SimConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class Turn:
+    """One turn of the laser as it was measured, for recorders and checks."""
+
+    started_s: float
+    """When step 0 was passed."""
+    ranges_mm: NDArray[np.int64]
+    """int64 (769,): mm or error codes by step."""
+
+
+@dataclass(frozen=True, slots=True)
 class Truth:
     """What only the simulator knows. For reports and tests, never for the robot."""
 
@@ -69,6 +79,7 @@ class Simulator:
         self.world = world
         self.config = config
         self.now_s = 0.0
+        self.last_scan: Turn | None = None
         self._ticks = 0
         self._path_m = 0.0
         self._scene = Scene(world, gui=gui)
@@ -127,6 +138,7 @@ class Simulator:
         self._path_m += math.hypot(after.x - before.x, after.y - before.y)
         scan = self._urg.step(begin, end, before, after, laser_on=self.scanner.laser_on)
         if scan is not None:
+            self.last_scan = Turn(self._urg.finished_s, scan)
             self._hokuyo.deliver(self.scanner.scan_done(self._urg.finished_s, scan), end + SCAN_USB_S)
         self._ticks += 1
         self.now_s = end

@@ -1,0 +1,127 @@
+"""Ways through a world on its ground-truth raster: for scripted tours only, the robot never sees them."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, sparse
+from scipy.sparse import csgraph
+
+from sim.errors import BadWorld
+from sim.raster import clearance_m
+from sim.world import Raster
+
+CELL_M = 0.10  # planning step; finer rasters are thinned
+KEEP_OFF_M = 0.27  # body radius 0.178 m and 9 cm to spare
+LIKE_OFF_M = 0.60  # nearer than this costs more, so that tours keep to the middle
+ROOF_REACH_M = 25.0
+
+
+class RoutePlanner:
+    """Shortest comfortable ways between points of one world."""
+
+    def __init__(self, raster: Raster) -> None:
+        self._stride = max(1, round(CELL_M / raster.resolution_m))
+        clearance = clearance_m(raster)[:: self._stride, :: self._stride]
+        self.passable: NDArray[np.bool_] = clearance >= KEEP_OFF_M
+        self._raster = raster
+        self._step_m = raster.resolution_m * self._stride
+        self._index = np.full(self.passable.shape, -1, dtype=np.int64)
+        self._index[self.passable] = np.arange(int(self.passable.sum()))
+        self._cells = np.argwhere(self.passable)
+        self._graph = self._build(clearance)
+
+    def _build(self, clearance: NDArray[np.float64]) -> sparse.csr_matrix:
+        cost = 1.0 + 4.0 * np.maximum(0.0, LIKE_OFF_M - clearance) / LIKE_OFF_M
+        rows, cols = self.passable.shape
+        sources, targets, weights = [], [], []
+        for dr, dc in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            here = np.s_[0 : rows - dr, max(0, -dc) : cols - max(0, dc)]
+            there = np.s_[dr:rows, max(0, dc) : cols + min(0, dc)]
+            both = self.passable[here] & self.passable[there]
+            sources.append(self._index[here][both])
+            targets.append(self._index[there][both])
+            weights.append(np.hypot(dr, dc) * self._step_m * (cost[here][both] + cost[there][both]) / 2)
+        count = len(self._cells)
+        edges = (np.concatenate(weights), (np.concatenate(sources), np.concatenate(targets)))
+        return sparse.csr_matrix(edges, shape=(count, count))
+
+    def _nearest(self, point: tuple[float, float]) -> int:
+        row, col = self._raster.cell(*point)
+        if not len(self._cells):
+            raise BadWorld("tour: the world has no passable cell")
+        offsets = self._cells * self._stride - [row, col]
+        best = int(np.argmin((offsets**2).sum(axis=1)))
+        if np.hypot(*offsets[best]) * self._raster.resolution_m > 1.0:
+            raise BadWorld(f"tour: nothing passable within 1 m of ({point[0]:g}, {point[1]:g})")
+        return best
+
+    def distances(self, start: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return cost to every passable cell (inf unreachable) and its predecessor, by cell number."""
+        found = csgraph.dijkstra(
+            self._graph, directed=False, indices=np.array([self._nearest(start)]), return_predecessors=True
+        )
+        return np.asarray(found[0])[0], np.asarray(found[1])[0].astype(np.int64)
+
+    def path(self, start: tuple[float, float], goal: tuple[float, float]) -> NDArray[np.float64]:
+        """Return points, float64 (N, 2) metres, about a cell apart. Raises BadWorld when there is no way."""
+        cost, before = self.distances(start)
+        cell = self._nearest(goal)
+        if not np.isfinite(cost[cell]):
+            raise BadWorld(f"tour: no way from {start} to {goal}")
+        cells = [cell]
+        while before[cells[-1]] >= 0:
+            cells.append(int(before[cells[-1]]))
+        points = np.array([self.point(number) for number in reversed(cells)])
+        return _smooth(points)
+
+    def through(self, waypoints: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
+        """Return one path through all waypoints in order."""
+        legs = [self.path(a, b) for a, b in pairwise(waypoints)]
+        return np.concatenate(legs)
+
+    def point(self, number: int) -> tuple[float, float]:
+        """Return the centre of a passable cell, metres."""
+        row, col = self._cells[number] * self._stride
+        return self._raster.point(int(row), int(col))
+
+    def places(self, start: tuple[float, float], spacing_m: float) -> list[tuple[float, float]]:
+        """Return reachable points under a roof, at least spacing_m apart, those with most room first."""
+        cost, _ = self.distances(start)
+        room = clearance_m(self._raster)[:: self._stride, :: self._stride][self.passable]
+        sheltered = under_roof(self._raster)[:: self._stride, :: self._stride][self.passable]
+        good = np.flatnonzero(np.isfinite(cost) & sheltered & (room > KEEP_OFF_M + 0.1))
+        order = good[np.lexsort((good, -np.round(np.minimum(room[good], 1.5), 1)))]
+        points = np.array([self.point(int(number)) for number in order]).reshape(-1, 2)
+        chosen: list[tuple[float, float]] = []
+        open_ = np.ones(len(points), dtype=np.bool_)
+        for index, (x, y) in enumerate(points):
+            if open_[index]:
+                chosen.append((float(x), float(y)))
+                open_ &= np.hypot(points[:, 0] - x, points[:, 1] - y) >= spacing_m
+        return chosen
+
+
+def _smooth(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Round the grid's corners off: a running mean that keeps both ends."""
+    if len(points) < 5:
+        return points
+    smooth = points.copy()
+    for axis in (0, 1):
+        smooth[:, axis] = ndimage.uniform_filter1d(points[:, axis], 5, mode="nearest")
+    smooth[0], smooth[-1] = points[0], points[-1]
+    return smooth
+
+
+def under_roof(raster: Raster) -> NDArray[np.bool_]:
+    """Return the free cells with a wall to the north, south, east and west of them."""
+    reach = round(ROOF_REACH_M / raster.resolution_m)
+    sheltered = raster.free.copy()
+    for axis in (0, 1):
+        for occupied, flip in ((raster.occupied, False), (np.flip(raster.occupied, axis), True)):
+            number = np.arange(occupied.shape[axis]).reshape([-1, 1] if axis == 0 else [1, -1])
+            last = np.maximum.accumulate(np.where(occupied, number, -reach - 1), axis=axis)
+            near = number - last <= reach
+            sheltered &= np.flip(near, axis) if flip else near
+    return sheltered
