@@ -10,11 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lemtomap.se2 import Pose, compose
-from lemtomap.topo.graph import Covariance, chain_covariance
+from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.paging import PagedGraph, Reached
+from lemtomap.topo.solve import Problem, solve_local
 from lemtomap.types import GridView
 
 EDGE_MARGIN_M = 1.0  # a node nearer to the window's border than this has lost its surroundings
+
+AGREE_CHI2 = 1e-3  # edges that disagree by less than this need no solve
+SOLVE_ITERATIONS = 20  # far more than a warm start takes
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,4 +75,32 @@ class LocalMap:
                 step = reached.via.seen_from(from_id)
                 covariance = chain_covariance(before.covariance, step, reached.via.covariance_from(from_id))
                 settled[node_id] = Standing(compose(before.T_grid_node, step), covariance, anchored=False)
-        self.standings = settled
+        self.standings = self._solved(settled)
+
+    def _solved(self, settled: dict[int, Standing]) -> dict[int, Standing]:
+        """Fit the nodes that are not anchored to all edges among them (thesis, Figure 3-7c).
+
+        Composed along the shortest ways they start near the answer; where the edges agree nothing is solved.
+        """
+        free = [not standing.anchored for standing in settled.values()]
+        free[0] = False  # the associated node: the anchor of the whole
+        if not any(free):
+            return settled
+        index = {node_id: k for k, node_id in enumerate(settled)}
+        problem = Problem.of_edges(self._edges_among(settled), index)
+        poses = np.array([standing.T_grid_node for standing in settled.values()])
+        if len(problem.ends) == 0 or problem.chi2(poses) < AGREE_CHI2:
+            return settled
+        solution = solve_local(problem, poses, ~np.array(free), SOLVE_ITERATIONS)
+        return {
+            node_id: replace(standing, T_grid_node=pose) if loose else standing
+            for (node_id, standing), pose, loose in zip(settled.items(), solution.poses, free, strict=True)
+        }
+
+    def _edges_among(self, settled: dict[int, Standing]) -> list[Edge]:
+        return [
+            edge
+            for node_id in settled
+            for edge in self._graph.edges_of(node_id)
+            if edge.source_id == node_id and edge.target_id in settled
+        ]
