@@ -1,0 +1,86 @@
+"""Obstacle boundary ⇄ bytes. Decimetre cells and, across the wall, two-centimetre offsets.
+
+A wall's place across itself is what a match needs; along itself a decimetre is enough. So each set cell
+carries one small number: how far its points lie from the cell's middle along the boundary's normal, and the
+normal follows from the cells around it, on both sides of the coding.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.errors import BadMap
+from lemtomap.topo.place import kernels
+
+FORMAT = 1
+CELL_M = 0.1
+OFFSET_STEP_M = 0.02
+NORMAL_REACH_CELLS = 2
+HEADER_BYTES = 2
+MAX_RADIUS_M = 12.0
+SHRINK = 0.9  # each try at the byte budget keeps this much of the radius
+
+
+@dataclass(frozen=True, slots=True)
+class Boundary:
+    """A place's obstacle boundary in its node's frame."""
+
+    points: NDArray[np.float32]
+    """float32 (N, 2), metres."""
+    normals: NDArray[np.float32]
+    """float32 (N, 2), unit length, either of the two directions across the boundary."""
+    straightness: NDArray[np.float32]
+    """float32 (N,): 1 where the normal is sure, 0 where the boundary has no direction (a corner, a leg)."""
+    radius_m: float
+    """Boundary further than this from the node (Chebyshev) is left out."""
+
+
+def encode_place(
+    points_node: NDArray[np.floating], radius_m: float = 5.0, byte_budget: int | None = None
+) -> bytes:
+    """Return the code of boundary points, float (N, 2), metres, node frame; NaN rows are left out.
+
+    With a byte budget the radius shrinks until the code fits.
+    """
+    points = np.ascontiguousarray(points_node, dtype=np.float64).reshape(-1, 2)
+    while True:
+        cells = max(1, round(min(radius_m, MAX_RADIUS_M) / CELL_M))
+        code = bytes([FORMAT, cells]) + _encode(points, cells)
+        if byte_budget is None or len(code) <= byte_budget or cells == 1:
+            return code
+        radius_m *= SHRINK
+
+
+def decode_place(blob: bytes) -> Boundary:
+    """Return the boundary of a code. Raises BadMap for a code of another format."""
+    if len(blob) < HEADER_BYTES or blob[0] != FORMAT or blob[1] == 0:
+        raise BadMap("localisation data of an unknown format")
+    cells = blob[1]
+    bitmap, levels = _canvas(cells), _canvas(cells).astype(np.int8)
+    kernels.decode(np.frombuffer(blob, np.uint8, offset=HEADER_BYTES), bitmap, levels)
+    shape = kernels.cell_normals(bitmap, CELL_M, NORMAL_REACH_CELLS)
+    offsets_m = levels[bitmap > 0].astype(np.float64) * OFFSET_STEP_M
+    points = shape[:, :2] + offsets_m[:, None] * shape[:, 2:4]
+    return Boundary(
+        points.astype(np.float32),
+        shape[:, 2:4].astype(np.float32),
+        shape[:, 4].astype(np.float32),
+        cells * CELL_M,
+    )
+
+
+def _encode(points: NDArray[np.float64], cells: int) -> bytes:
+    bitmap = _canvas(cells)
+    means = np.zeros((*bitmap.shape, 2))
+    kernels.fill_bitmap(points, CELL_M, bitmap, means)
+    shape = kernels.cell_normals(bitmap, CELL_M, NORMAL_REACH_CELLS)
+    across_m = np.sum((means[bitmap > 0] - shape[:, :2]) * shape[:, 2:4], axis=1)
+    limit = kernels.LEVELS // 2
+    levels = _canvas(cells).astype(np.int8)
+    levels[bitmap > 0] = np.clip(np.rint(across_m / OFFSET_STEP_M), -limit, limit)
+    return bytes(kernels.encode(bitmap, levels))
+
+
+def _canvas(cells: int) -> NDArray[np.uint8]:
+    return np.zeros((2 * cells + 4, 2 * cells + 4), np.uint8)
