@@ -73,18 +73,17 @@ class DeviceClock:
         """Host time minus unwrapped device time at the last stamp."""
         return self._line(self._ticks * self._config.tick_s) - self._latency_s
 
-    def anchor(self, raw: int, sent_s: float, received_s: float) -> None:
-        """Take the true offset from a two-way exchange: the device read `raw` between the two host times.
+    def anchor(self, raw: int, offset_s: float, now_s: float) -> None:
+        """Begin an epoch with the true offset (host minus device time, stamp `raw` unwrapped as it is).
 
-        Begins a new epoch. The stream that follows arrives later than this; by how much is learnt from it.
+        The stream that follows arrives later than this; by how much is learnt from it.
         """
         self.restart()
-        self._raw, self._ticks, self._arrival_s = raw, raw, received_s
-        device_s = raw * self._config.tick_s
-        self._offset_s = 0.5 * (sent_s + received_s) - device_s * (1.0 + self._drift)
+        self._raw, self._ticks, self._arrival_s = raw % self._period, raw, now_s
+        self._offset_s = offset_s - self._drift * raw * self._config.tick_s
         self._latency_s = 0.0
-        self._bin_end_s = received_s + self._config.bin_s
-        self._learn_until_s = received_s + self._config.learn_s
+        self._bin_end_s = now_s + self._config.bin_s
+        self._learn_until_s = now_s + self._config.learn_s
 
     @property
     def fresh(self) -> bool:

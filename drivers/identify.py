@@ -6,22 +6,23 @@ from typing import Final
 KOBUKI: Final = "a Kobuki base"
 HOKUYO: Final = "a SCIP laser scanner"
 
-_SCIP_REPLY: Final = re.compile(
-    rb"(?:^|\n)(?:VV|PP|II|QT|RS|TM[012]|SCIP2\.0|[MG][DS]\d{8,13}|BM)[^\n]{0,17}\n(?:0|E|[0-9A-Z]{2}.)\n"
+_SCIP_ECHO: Final = re.compile(
+    rb"(?:^|\n)(?:VV|PP|II|QT|RS|BM|TM[012]|SCIP2\.0|[MG][DS]\d{8,13})\n(?:0|E|[0-9])"
 )
+_SCIP_BLOCK: Final = re.compile(rb"\n[0-o]{65}(?=\n)")
 _KOBUKI_FRAME: Final = re.compile(rb"\xaa\x55[\x11-\xff]\x01\x0f", re.DOTALL)
-_ENOUGH: Final = 200  # bytes without any frame of ours before they count as a stranger's
 
 
-def name_device(data: bytes) -> str | None:
-    """Return what kind of device sent these bytes, or None when they tell nothing (yet)."""
+def name_device(data: bytes, enough: int = 400) -> str | None:
+    """Return what kind of device sent these bytes, or None when they tell nothing (yet).
+
+    After `enough` bytes without anything known it is an unknown device.
+    """
     if len(_KOBUKI_FRAME.findall(data)) >= 2:
         return KOBUKI
-    if _SCIP_REPLY.search(data):
+    if _SCIP_ECHO.search(data) or len(_SCIP_BLOCK.findall(data)) >= 2:
         return HOKUYO
-    if len(data) < _ENOUGH:
-        return None
-    return "an unknown device"
+    return "an unknown device" if len(data) >= enough else None
 
 
 def excerpt(data: bytes, limit: int = 24) -> str:
