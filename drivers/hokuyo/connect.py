@@ -26,6 +26,9 @@ class Connection:
 
     def __init__(self, view: View, time_readings: int, version: Info | None, *, ask_version: bool) -> None:
         self.step = Step.QUIET
+        self._tries = 0
+        self._overdue_s = float("-inf")
+        self._sent_s = 0.0
         self.failure = ""
         self.failure_code = ""
         self.info: SensorInfo | None = None
@@ -37,7 +40,6 @@ class Connection:
         self._maker: ScanMaker | None = None
         self._switched = False
         self._left_time = 0
-        self._go(Step.QUIET)
 
     @property
     def maker(self) -> ScanMaker:
@@ -158,8 +160,15 @@ class Connection:
     def _take_state(self, reply: Info | None) -> None:
         told = dict(self.version.fields) if self.version is not None else {}
         state = {} if reply is None else {k: v for k, v in reply.fields.items() if k not in reply.doubtful}
-        names = (told.get(key, "") for key in ("VEND", "PROD", "FIRM", "PROT", "SERI"))
-        self.info = SensorInfo(*names, parameters=self.maker.sensor, state=state)
+        self.info = SensorInfo(
+            vendor=told.get("VEND", ""),
+            product=told.get("PROD", ""),
+            firmware=told.get("FIRM", ""),
+            protocol=told.get("PROT", ""),
+            serial=told.get("SERI", ""),
+            parameters=self.maker.sensor,
+            state=state,
+        )
         self._go(Step.ENTER_TIME)
 
     def _take_time(self, reply: ClockReading, now_s: float) -> None:

@@ -45,7 +45,7 @@ class View:
             end = min(end, math.floor(self.angle_max_rad / sensor.step_rad + sensor.front_step + 1e-9))
         if end < start:
             raise ValueError(f"the sensor sees nothing of {self.angle_min_rad} to {self.angle_max_rad} rad")
-            return ScanRequest(start, end, self.cluster, self.skip, self.count)
+        return ScanRequest(start, end, self.cluster, self.skip, self.count)
 
 
 class ScanMaker:
