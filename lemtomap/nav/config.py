@@ -105,7 +105,7 @@ class ExploreConfig:
 
     period_s: float = 0.5
     least_size_m: float = 0.25  # a 0.8 m door leaves 0.4 m to the middle of a Kobuki
-    least_unknown_m2: float = 0.10  # smaller dark patches are gaps between beams
+    least_depth_m: float = 0.20  # dark seams less than twice this deep are gaps between beams
     goal_tolerance_m: float = 0.40
     switch_share: float = 0.5  # another opening must cost less than this share of the present one's
     turn_price_m: float = 1.0  # turning right round costs about this much way

@@ -20,6 +20,7 @@ from lemtomap.nav.metric import MetricPlan, Reach, plan_to, reach_from
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
 from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
+from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.route.planner import Route, plan_route
 from lemtomap.nav.sliding import BORDER_M, Target, choose_target, find_barrier, place_of
 from lemtomap.nav.surroundings import Surroundings
@@ -183,7 +184,8 @@ class Navigator:
             self._route = route.since(here)
             return self._route
         self._closed = {edge: until for edge, until in self._closed.items() if until > moment.now_s}
-        route = plan_route(graph, here, goal.node_id, moment.now_s, self.config.route, self._closed)
+        fresh = FreshGraph(graph, moment.map_view, self.config.route.usual_speed_mps)
+        route = plan_route(fresh, here, goal.node_id, moment.now_s, self.config.route, self._closed)
         self._route, self._route_version = route, graph.version
         return route
 

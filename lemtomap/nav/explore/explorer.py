@@ -2,7 +2,7 @@
 
 import heapq
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from lemtomap import se2
 from lemtomap.nav import kernels
 from lemtomap.nav.config import ExploreConfig, NavConfig
 from lemtomap.nav.costmap import Costmap
-from lemtomap.nav.explore.frontier import Opening, find_openings, frontier_points
+from lemtomap.nav.explore.frontier import find_openings
 from lemtomap.nav.explore.memory import SeenMemory
 from lemtomap.nav.explore.openings import Openings
 from lemtomap.nav.metric import Reach, reach_from, top_cost
@@ -40,7 +40,11 @@ class _Pursuit:
     number: int
     goal: Goal
     since_s: float
-    arrived_s: float | None = field(default=None)
+    told_s: float
+    """When the navigator was given the goal last."""
+    arrived_s: float | None = None
+    facing: bool = False
+    """Having arrived, the robot was told to look into the opening."""
 
 
 class Explorer:
@@ -95,12 +99,9 @@ class Explorer:
         costs = self._costmap.build(map_view.stamp_s, np.empty((0, 2)), T_grid_base[:2])
         reach = reach_from(costs, T_grid_base)
         self._memory.take(costs, map_view.T_grid_node, T_grid_base)
-        skip = np.zeros(costs.state.shape, dtype=np.uint8)
-        rows, cols = frontier_points(reach, config.least_unknown_m2)
-        points_grid = costs.to_grid(np.stack([rows + 0.5, cols + 0.5], axis=-1))
-        skip[rows, cols] = self._memory.seen(points_grid, map_view.T_grid_node)
-        openings: list[Opening] = find_openings(reach, config.least_size_m, config.least_unknown_m2, skip)
-        self._openings.match(openings, map_view.T_grid_node, costs)
+        seen = self._memory.recall(costs, map_view.T_grid_node)
+        openings = find_openings(reach, seen, config.least_size_m, config.least_depth_m)
+        self._openings.match(openings, map_view.T_grid_node, costs, seen)
         return reach
 
     def _judge(self, navigation: NavOutput | None, now_s: float) -> None:
@@ -111,8 +112,7 @@ class Explorer:
         if self._openings.get(pursuit.number) is None:
             self._pursuit = None
             return
-        mine = navigation is not None and navigation.stamp_s > pursuit.since_s
-        if not mine or navigation is None:
+        if navigation is None or navigation.stamp_s <= pursuit.told_s:
             return
         late = now_s - pursuit.since_s > self.config.patience_s
         if navigation.state == NavState.FAILED or late:
@@ -122,7 +122,7 @@ class Explorer:
             self._pursuit = None
         elif navigation.state == NavState.ARRIVED:
             pursuit.arrived_s = now_s if pursuit.arrived_s is None else pursuit.arrived_s
-            if now_s - pursuit.arrived_s > self.config.linger_s:
+            if pursuit.facing and now_s - pursuit.arrived_s > self.config.linger_s:
                 self._openings.spend(pursuit.number)
                 self._pursuit = None
 
@@ -131,8 +131,9 @@ class Explorer:
     ) -> Goal | None:
         """Return a new goal if another opening is to be pursued, or the pursued one has moved."""
         ready = self._openings.ready(now_s)
-        lingering = self._pursuit is not None and self._pursuit.arrived_s is not None
-        if not ready or lingering:
+        if self._pursuit is not None and self._pursuit.arrived_s is not None:
+            return self._face(self._pursuit, now_s)
+        if not ready:
             return None
         prices = self._prices(ready, map_view, graph, reach, T_grid_base)
         if not prices:
@@ -146,16 +147,26 @@ class Explorer:
             number = number if prices[number] < self.config.switch_share * pursued else self._pursuit.number
         return self._pursue(next(p for p in ready if p.placeholder_id == number), now_s)
 
+    def _face(self, pursuit: _Pursuit, now_s: float) -> Goal | None:
+        """Return, once, the goal to look into the opening from where the robot arrived."""
+        opening = self._openings.get(pursuit.number)
+        if pursuit.facing or opening is None:
+            return None
+        pursuit.facing, pursuit.arrived_s, pursuit.told_s = True, None, now_s
+        return replace(
+            pursuit.goal, yaw_node_rad=opening.yaw_rad, tolerance_m=2.0 * self.config.goal_tolerance_m
+        )
+
     def _pursue(self, opening: Placeholder, now_s: float) -> Goal | None:
         """Return the goal at an opening if the navigator is not on its way there already."""
         goal = Goal(opening.node_id, (opening.x_m, opening.y_m), None, self.config.goal_tolerance_m)
         pursuit = self._pursuit
         if pursuit is None or pursuit.number != opening.placeholder_id:
-            self._pursuit = _Pursuit(opening.placeholder_id, goal, now_s)
+            self._pursuit = _Pursuit(opening.placeholder_id, goal, now_s, now_s)
             return goal
         if _same_place(pursuit.goal, goal):
             return None
-        pursuit.goal = goal
+        pursuit.goal, pursuit.told_s = goal, now_s
         return goal
 
     def _prices(

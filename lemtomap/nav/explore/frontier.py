@@ -10,6 +10,8 @@ from lemtomap.nav.metric import Reach
 
 JOIN_CELLS = 2
 """Frontier cells this near to each other belong to one opening."""
+NEAR_CELLS = 4
+"""Remembered ground is drawn this much too large; new ground begins beyond."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,15 +26,16 @@ class Opening:
 
 
 def find_openings(
-    reach: Reach, least_size_m: float, least_unknown_m2: float, skip: NDArray[np.uint8] | None = None
+    reach: Reach, seen: NDArray[np.uint8], least_size_m: float, least_depth_m: float
 ) -> list[Opening]:
-    """Return the openings of the window. skip: uint8 (rows, cols), 1 where frontier cells do not count."""
-    costs = reach.costs
-    res = costs.resolution_m
-    large = kernels.large_unknown(costs.state, max(1, round(least_unknown_m2 / res**2)))
-    mask = kernels.frontier_cells(reach.level, large)
-    if skip is not None:
-        mask[skip == 1] = 0
+    """Return the openings of the window.
+
+    seen: uint8 (rows, cols), 1 where the ground is known or was known once; a patch of unseen ground counts
+    when a square of twice least_depth_m fits into it.
+    """
+    res = reach.costs.resolution_m
+    large = kernels.large_unknown(seen, max(1, round(least_depth_m / res)))
+    mask = kernels.frontier_cells(reach.level, reach.costs.state, large, NEAR_CELLS)
     label = np.zeros(mask.shape, dtype=np.int32)
     count = kernels.label_clusters(mask, label, JOIN_CELLS)
     rows, cols = np.nonzero(label)
@@ -41,18 +44,9 @@ def find_openings(
     for number in range(1, count + 1):
         members = of == number
         size_m = float(members.sum()) * res
-        if size_m < least_size_m:
-            continue
-        found.append(_opening(rows[members], cols[members], size_m, large, reach))
+        if size_m >= least_size_m:
+            found.append(_opening(rows[members], cols[members], size_m, large, reach))
     return found
-
-
-def frontier_points(reach: Reach, least_unknown_m2: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return rows and cols of all frontier cells."""
-    res = reach.costs.resolution_m
-    large = kernels.large_unknown(reach.costs.state, max(1, round(least_unknown_m2 / res**2)))
-    rows, cols = np.nonzero(kernels.frontier_cells(reach.level, large))
-    return rows, cols
 
 
 def _opening(

@@ -4,55 +4,73 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-F8 = NDArray[np.float64]
 I4 = NDArray[np.int32]
 U1 = NDArray[np.uint8]
 
-UNKNOWN, LETHAL = 1, 2
+UNKNOWN = 1
 
 
 @njit(nogil=True, cache=True)
-def large_unknown(state: U1, least: int) -> U1:
-    """Return 1 where a cell belongs to a 4-connected unknown patch of at least that many cells."""
-    height, width = state.shape
+def large_unknown(seen: U1, depth: int) -> U1:
+    """Return 1 on 4-connected unseen patches that hold a square of 2 * depth + 1 unseen cells.
+
+    Thin dark seams (along walls, between beams, where a forgotten picture does not quite fit) are no patch.
+    """
+    height, width = seen.shape
+    total = np.zeros((height + 1, width + 1), dtype=np.int32)
+    for r in range(height):
+        row = 0
+        for c in range(width):
+            row += 1 - seen[r, c]
+            total[r + 1, c + 1] = total[r, c + 1] + row
+    side = 2 * depth + 1
     large = np.zeros((height, width), dtype=np.uint8)
-    seen = np.zeros((height, width), dtype=np.uint8)
     queue = np.empty(height * width, dtype=np.int32)
-    for start in range(height * width):
-        if state[start // width, start % width] != UNKNOWN or seen[start // width, start % width]:
-            continue
-        queue[0] = start
-        seen[start // width, start % width] = 1
-        head, tail = 0, 1
-        while head < tail:
-            r, c = queue[head] // width, queue[head] % width
-            head += 1
-            for k in range(4):
-                rr = r + (1 if k == 0 else -1 if k == 1 else 0)
-                cc = c + (1 if k == 2 else -1 if k == 3 else 0)
-                if rr < 0 or cc < 0 or rr >= height or cc >= width:
-                    continue
-                if state[rr, cc] == UNKNOWN and seen[rr, cc] == 0:
-                    seen[rr, cc] = 1
-                    queue[tail] = rr * width + cc
-                    tail += 1
-        if tail >= least:
-            for i in range(tail):
-                large[queue[i] // width, queue[i] % width] = 1
+    tail = 0
+    for r in range(height - side + 1):
+        for c in range(width - side + 1):
+            dark = total[r + side, c + side] - total[r, c + side] - total[r + side, c] + total[r, c]
+            if dark == side * side:
+                large[r + depth, c + depth] = 1
+                queue[tail] = (r + depth) * width + c + depth
+                tail += 1
+    head = 0
+    while head < tail:
+        r, c = queue[head] // width, queue[head] % width
+        head += 1
+        for k in range(4):
+            rr = r + (1 if k == 0 else -1 if k == 1 else 0)
+            cc = c + (1 if k == 2 else -1 if k == 3 else 0)
+            if rr < 0 or cc < 0 or rr >= height or cc >= width:
+                continue
+            if seen[rr, cc] == 0 and large[rr, cc] == 0:
+                large[rr, cc] = 1
+                queue[tail] = rr * width + cc
+                tail += 1
     return large
 
 
 @njit(nogil=True, cache=True)
-def frontier_cells(reach: U1, large: U1) -> U1:
-    """Return 1 where the robot can stand on seen floor beside a large unknown patch."""
+def frontier_cells(reach: U1, state: U1, large: U1, near: int) -> U1:
+    """Return 1 where the robot can stand on known floor with a large unseen patch within `near` cells."""
     height, width = reach.shape
     out = np.zeros((height, width), dtype=np.uint8)
     for r in range(1, height - 1):
         for c in range(1, width - 1):
-            if reach[r, c] == 1 and (
-                large[r - 1, c] or large[r + 1, c] or large[r, c - 1] or large[r, c + 1]
-            ):
-                out[r, c] = 1
+            if reach[r, c] != 1:
+                continue
+            edge = (
+                state[r - 1, c] == UNKNOWN
+                or state[r + 1, c] == UNKNOWN
+                or state[r, c - 1] == UNKNOWN
+                or state[r, c + 1] == UNKNOWN
+            )
+            if not edge:
+                continue
+            for rr in range(max(0, r - near), min(height, r + near + 1)):
+                for cc in range(max(0, c - near), min(width, c + near + 1)):
+                    if large[rr, cc]:
+                        out[r, c] = 1
     return out
 
 
@@ -82,17 +100,41 @@ def label_clusters(mask: U1, label: I4, reach_cells: int) -> int:
 
 
 @njit(nogil=True, cache=True)
-def sight_lengths(state: U1, row: float, col: float, yaw: float, lengths: F8) -> None:
-    """Raise each direction's length (cells) to how far seen floor goes from (row, col), from yaw on."""
+def remember(state: U1, row: float, col: float, yaw: float, cell: float, bits: U1) -> None:
+    """Set the bits of a node's picture (node at its middle, turned by yaw) whose ground is known all over."""
     height, width = state.shape
-    n = lengths.size
-    for i in range(n):
-        angle = yaw + 2.0 * np.pi * i / n
-        dr, dc = np.sin(angle), np.cos(angle)
-        k = 0.0
-        while True:
-            r, c = int(np.floor(row + dr * k)), int(np.floor(col + dc * k))
-            if r < 0 or c < 0 or r >= height or c >= width or state[r, c] != 0:
-                break
-            k += 0.5
-        lengths[i] = max(lengths[i], k)
+    side = bits.shape[0]
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for i in range(side):
+        for j in range(side):
+            if bits[i, j]:
+                continue
+            known = True
+            for k in range(5):
+                y = (i + 0.5 - 0.5 * side + (0.35 if k == 1 else -0.35 if k == 2 else 0.0)) * cell
+                x = (j + 0.5 - 0.5 * side + (0.35 if k == 3 else -0.35 if k == 4 else 0.0)) * cell
+                r = int(np.floor(row + sin * x + cos * y))
+                c = int(np.floor(col + cos * x - sin * y))
+                if r < 0 or c < 0 or r >= height or c >= width or state[r, c] == UNKNOWN:
+                    known = False
+                    break
+            if known:
+                bits[i, j] = 1
+
+
+@njit(nogil=True, cache=True)
+def recall(seen: U1, row: float, col: float, yaw: float, cell: float, bits: U1, stamp: float) -> None:
+    """Set seen around each cell of a node's picture, in squares `stamp` cells wide."""
+    height, width = seen.shape
+    side = bits.shape[0]
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    half = 0.5 * stamp
+    for i in range(side):
+        for j in range(side):
+            if bits[i, j] == 0:
+                continue
+            y, x = (i + 0.5 - 0.5 * side) * cell, (j + 0.5 - 0.5 * side) * cell
+            r, c = row + sin * x + cos * y, col + cos * x - sin * y
+            for rr in range(max(0, int(r - half)), min(height, int(r + half) + 1)):
+                for cc in range(max(0, int(c - half)), min(width, int(c + half) + 1)):
+                    seen[rr, cc] = 1

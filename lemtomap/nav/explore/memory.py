@@ -1,6 +1,7 @@
-"""What has been seen from each node, so that floor the window forgot is not taken for unexplored.
+"""What has been seen around each node, so that floor the window forgot is not taken for unexplored.
 
-A node keeps how far seen floor reached in 72 directions, in its own frame: 288 bytes.
+A node keeps a coarse picture, in its own frame, of the ground the window knew when the robot was near:
+one bit for each quarter metre, 288 bytes a node.
 """
 
 from collections.abc import Mapping
@@ -8,51 +9,45 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap import se2
 from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore import kernels
-from lemtomap.nav.types import Points
 from lemtomap.se2 import Pose
 
-DIRECTIONS = 72
+SIDE = 48
+CELL_M = 0.25
 TAKEN_WITHIN_M = 3.0
-"""A node's view is taken while the robot is this near: the window then knows its surroundings best."""
-CONSULTED_WITHIN_M = 8.0
-MARGIN_M = 0.30
-"""A point must lie this far inside a view: the node's place in the window errs by some centimetres."""
+"""A node's picture is taken while the robot is this near: the window then knows its surroundings best."""
+STAMP_M = 0.35
+"""A remembered cell covers this much: the node's place in the window errs by some centimetres."""
 
 
 class SeenMemory:
-    """Views of all nodes met so far."""
+    """Pictures of all nodes met so far."""
 
     def __init__(self) -> None:
-        self._views_m: dict[int, NDArray[np.float32]] = {}
+        self._pictures: dict[int, NDArray[np.uint8]] = {}
 
-    def take(self, costs: Costs, T_grid_node: Mapping[int, Pose], p_robot_grid: Pose) -> None:
-        """Widen the views of the nodes near the robot by what the window shows now."""
+    def take(self, costs: Costs, T_grid_node: Mapping[int, Pose], T_grid_base: Pose) -> None:
+        """Add to the pictures of the nodes near the robot what the window shows now."""
+        cell = CELL_M / costs.resolution_m
         for node_id, node in T_grid_node.items():
-            near = np.hypot(*(node[:2] - p_robot_grid[:2])) <= TAKEN_WITHIN_M
-            if not near or not costs.holds(node):
+            if np.hypot(*(node[:2] - T_grid_base[:2])) > TAKEN_WITHIN_M:
                 continue
-            old_m = self._views_m.get(node_id)
-            lengths = np.zeros(DIRECTIONS) if old_m is None else old_m / costs.resolution_m
-            lengths = np.ascontiguousarray(lengths, dtype=np.float64)
+            packed = self._pictures.get(node_id)
+            bits = np.zeros(SIDE * SIDE, dtype=np.uint8) if packed is None else np.unpackbits(packed)
             row, col = costs.cell(node)
-            kernels.sight_lengths(costs.state, row, col, float(node[2]), lengths)
-            self._views_m[node_id] = (lengths * costs.resolution_m).astype(np.float32)
+            kernels.remember(costs.state, row, col, float(node[2]), cell, bits.reshape(SIDE, SIDE))
+            self._pictures[node_id] = np.packbits(bits)
 
-    def seen(self, points_grid: Points, T_grid_node: Mapping[int, Pose]) -> NDArray[np.bool_]:
-        """Tell for each point (N, 2), metres, whether it was seen before from some node in the window."""
-        seen = np.zeros(len(points_grid), dtype=bool)
+    def recall(self, costs: Costs, T_grid_node: Mapping[int, Pose]) -> NDArray[np.uint8]:
+        """Return uint8 (rows, cols): 1 where the ground is known or was seen from a node before."""
+        seen = (costs.state != kernels.UNKNOWN).astype(np.uint8)
+        cell, stamp = CELL_M / costs.resolution_m, STAMP_M / costs.resolution_m
         for node_id, node in T_grid_node.items():
-            view_m = self._views_m.get(node_id)
-            if view_m is None:
+            packed = self._pictures.get(node_id)
+            if packed is None or not costs.holds(node, -0.5 * SIDE * CELL_M):
                 continue
-            p_node = se2.transform(se2.inverse(node), points_grid)
-            away_m = np.hypot(p_node[:, 0], p_node[:, 1])
-            bearing = np.arctan2(p_node[:, 1], p_node[:, 0])
-            sector = np.rint(bearing / (2.0 * np.pi / DIRECTIONS)).astype(int)
-            # Unseen ground beside the line of sight lies in the shadow of what cuts a neighbouring one short.
-            least_m = np.minimum.reduce([view_m[(sector + k) % DIRECTIONS] for k in (-1, 0, 1)])
-            seen |= (away_m < least_m - MARGIN_M) & (away_m < CONSULTED_WITHIN_M)
-        return seen
+            row, col = costs.cell(node)
+            bits = np.unpackbits(packed).reshape(SIDE, SIDE)
+            kernels.recall(seen, row, col, float(node[2]), cell, bits, stamp)
+        return np.asarray(seen)

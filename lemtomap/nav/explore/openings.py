@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.nav.costmap import Costs
@@ -54,15 +55,24 @@ class Openings:
         kept = self._kept.get(placeholder_id)
         return None if kept is None else kept.placeholder
 
-    def match(self, seen: Sequence[Opening], T_grid_node: Mapping[int, Pose], costs: Costs) -> None:
-        """Join the openings seen now with those known; drop known ones that turn out explored."""
+    def match(
+        self,
+        openings: Sequence[Opening],
+        T_grid_node: Mapping[int, Pose],
+        costs: Costs,
+        seen: NDArray[np.uint8],
+    ) -> None:
+        """Join the openings in the window now with those known; drop known ones that turn out explored.
+
+        seen: uint8 (rows, cols), 1 where the ground is known or was known once.
+        """
         places = {
             number: se2.transform(T_grid_node[kept.placeholder.node_id], _point(kept.placeholder))
             for number, kept in self._kept.items()
             if kept.placeholder.node_id in T_grid_node
         }
         free = dict(places)
-        for opening in sorted(seen, key=lambda o: -o.size_m):
+        for opening in sorted(openings, key=lambda o: -o.size_m):
             number = _nearest(opening.p_grid, free)
             if number is not None:
                 del free[number]
@@ -71,7 +81,7 @@ class Openings:
             self._keep(number, opening, T_grid_node)
         for number, place in free.items():
             kept = self._kept[number]
-            if kept.placeholder.state == OpeningState.OPEN and _surroundings_known(costs, place):
+            if kept.placeholder.state == OpeningState.OPEN and _surroundings_known(costs, seen, place):
                 self.done(number, closed=False)
 
     def _keep(self, number: int | None, opening: Opening, T_grid_node: Mapping[int, Pose]) -> None:
@@ -130,11 +140,10 @@ def _nearest(p_grid: tuple[float, float], places: Mapping[int, np.ndarray]) -> i
     return number if np.hypot(*(places[number] - p_grid)) <= SAME_M else None
 
 
-def _surroundings_known(costs: Costs, p_grid: np.ndarray) -> bool:
-    """Tell whether a place lies well inside the window and is seen floor now."""
+def _surroundings_known(costs: Costs, seen: NDArray[np.uint8], p_grid: np.ndarray) -> bool:
+    """Tell whether a place lies well inside the window and all ground about it has been seen."""
     if not costs.holds(p_grid, 0.5):
         return False
     row, col = costs.cell(p_grid)
     r, c = int(row), int(col)
-    patch = costs.state[r - 3 : r + 4, c - 3 : c + 4]
-    return bool((patch == 1).mean() < 0.5)
+    return bool(seen[r - 3 : r + 4, c - 3 : c + 4].mean() > 0.5)

@@ -47,7 +47,7 @@ def explore(world: World, seconds: float, window_m: float):
     return wish, events, seen
 
 
-@pytest.mark.parametrize("window_m", [20.0])
+@pytest.mark.parametrize("window_m", [20.0, 6.0])
 def test_explores_the_whole_office_and_ends_by_itself(window_m):
     world = office()
     wish, events, seen = explore(world, 400.0, window_m)

@@ -1,0 +1,42 @@
+"""The route graph with the newest nodes: the mapper commits to its file only now and then."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lemtomap.types import MapView, RouteEdge, RouteGraph
+
+NEWEST = 4
+"""IDs grow, so only the largest few of the view can be missing from the file."""
+
+
+class FreshGraph:
+    """A RouteGraph that joins a map view's newborn nodes to the graph on file."""
+
+    def __init__(self, graph: RouteGraph, map_view: MapView, usual_speed_mps: float) -> None:
+        self._graph = graph
+        newest = sorted(map_view.T_grid_node)[-NEWEST:]
+        self._newborn = {node_id for node_id in newest if not graph.has_node(node_id)}
+        self._extra: dict[int, list[RouteEdge]] = {}
+        for edge_id, a, b, _ in map_view.edges if self._newborn else ():
+            if a not in self._newborn and b not in self._newborn:
+                continue
+            length_m = float(np.hypot(*(map_view.T_grid_node[a] - map_view.T_grid_node[b])[:2]))
+            for here, other in ((a, b), (b, a)):
+                edge = RouteEdge(edge_id, other, length_m, length_m / usual_speed_mps)
+                self._extra.setdefault(here, []).append(edge)
+
+    @property
+    def version(self) -> int:
+        """The version of the graph on file."""
+        return self._graph.version
+
+    def has_node(self, node_id: int) -> bool:
+        """Tell whether the file or the view knows this node."""
+        return node_id in self._newborn or self._graph.has_node(node_id)
+
+    def edges_of(self, node_id: int) -> Sequence[RouteEdge]:
+        """Return the edges at a node, of the file and of the view."""
+        known = () if node_id in self._newborn else self._graph.edges_of(node_id)
+        extra = self._extra.get(node_id)
+        return known if extra is None else [*known, *extra]
