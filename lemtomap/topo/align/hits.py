@@ -1,0 +1,58 @@
+"""Averaged laser hits around the robot, finer than the window's cells: what places are made of.
+
+A ring of cells with a fixed size, like the window itself: memory is flat, and what the robot left behind is
+overwritten by what it meets next.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose, between, transform
+from lemtomap.topo.align import kernels
+from lemtomap.types import GridView
+
+CELL_M = 0.05
+LEAST_HITS = 2.0  # one hit alone may be a mixed pixel at an edge
+EVERY_M = 0.1  # a scan taken from nearly the same place tells nothing new
+EVERY_RAD = 0.1
+
+
+class HitMap:
+    """Mean hit of each cell, in the grid frame."""
+
+    def __init__(self, size_m: float = 24.0) -> None:
+        cells = round(size_m / CELL_M)
+        self._owner = np.full((cells, cells, 2), np.iinfo(np.int32).min, np.int32)
+        self._sums = np.zeros((cells, cells, 3))
+        self._last: Pose | None = None
+
+    def add(self, T_grid_base: Pose, points_base: NDArray[np.floating]) -> None:
+        """Take in a scan's hits, float (N, 2), metres, base frame, when the robot has moved a little."""
+        if self._last is not None:
+            moved = between(self._last, T_grid_base)
+            if np.hypot(moved[0], moved[1]) < EVERY_M and abs(moved[2]) < EVERY_RAD:
+                return
+        self._last = np.array(T_grid_base)
+        kernels.add_hits(transform(T_grid_base, points_base), CELL_M, self._owner, self._sums)
+
+    def around(
+        self, centre_m: tuple[float, float], radius_m: float, grid: GridView, occupied_from: int
+    ) -> NDArray[np.float64]:
+        """Return the hits in a square that the window still holds for occupied, float64 (N, 2), grid frame.
+
+        Without any hits (no scan points were given) the boundary cells of the window stand in for them.
+        """
+        window = (grid.resolution_m, *grid.origin_m)
+        if self._last is None:
+            return kernels.boundary_cells(grid.occupancy, *window, *centre_m, radius_m, occupied_from)
+        return kernels.collect_hits(
+            self._owner,
+            self._sums,
+            CELL_M,
+            *centre_m,
+            radius_m,
+            LEAST_HITS,
+            grid.occupancy,
+            *window,
+            occupied_from,
+        )

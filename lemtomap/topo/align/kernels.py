@@ -1,0 +1,296 @@
+"""Jitted matching of a place's boundary against the hits in the window."""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Indices = NDArray[np.int32]
+Cells = NDArray[np.int8]
+
+
+@njit(nogil=True, cache=True)
+def add_hits(points: Values, cell: float, owner: Indices, sums: Values) -> None:
+    """Add grid-frame points to a ring of cells: owner (S, S, 2) is whose cell it is, sums (S, S, 3) x, y, n.
+
+    A cell that last belonged to another place of the building starts anew.
+    """
+    size = owner.shape[0]
+    for k in range(points.shape[0]):
+        x, y = points[k, 0], points[k, 1]
+        if not (math.isfinite(x) and math.isfinite(y)):
+            continue
+        col, row = math.floor(x / cell), math.floor(y / cell)
+        r, c = row % size, col % size
+        if owner[r, c, 0] != row or owner[r, c, 1] != col:
+            owner[r, c, 0], owner[r, c, 1] = row, col
+            sums[r, c, :] = 0.0
+        if sums[r, c, 2] > 100.0:  # the mean goes on following a wall that moved
+            sums[r, c, :] *= 0.5
+        sums[r, c, 0] += x
+        sums[r, c, 1] += y
+        sums[r, c, 2] += 1.0
+
+
+@njit(nogil=True, cache=True)
+def collect_hits(
+    owner: Indices,
+    sums: Values,
+    cell: float,
+    centre_x: float,
+    centre_y: float,
+    radius: float,
+    least: float,
+    occupancy: Cells,
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    occupied_from: int,
+) -> Values:
+    """Return the mean hits within a square around a centre that the window still believes, float64 (N, 2)."""
+    size = owner.shape[0]
+    rows, cols = occupancy.shape
+    reach = min(math.ceil(radius / cell), size // 2 - 1)
+    row0, col0 = math.floor(centre_y / cell), math.floor(centre_x / cell)
+    out = np.empty(((2 * reach + 1) ** 2, 2))
+    count = 0
+    for row in range(row0 - reach, row0 + reach + 1):
+        for col in range(col0 - reach, col0 + reach + 1):
+            r, c = row % size, col % size
+            if owner[r, c, 0] != row or owner[r, c, 1] != col or sums[r, c, 2] < least:
+                continue
+            x, y = sums[r, c, 0] / sums[r, c, 2], sums[r, c, 1] / sums[r, c, 2]
+            i, j = math.floor((y - origin_y) / resolution), math.floor((x - origin_x) / resolution)
+            believed = False
+            for di in range(-1, 2):
+                for dj in range(-1, 2):
+                    if 0 <= i + di < rows and 0 <= j + dj < cols:
+                        believed |= occupancy[i + di, j + dj] >= occupied_from
+            if believed:
+                out[count, 0], out[count, 1] = x, y
+                count += 1
+    return out[:count].copy()
+
+
+@njit(nogil=True, cache=True)
+def boundary_cells(
+    occupancy: Cells,
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    centre_x: float,
+    centre_y: float,
+    radius: float,
+    occupied_from: int,
+) -> Values:
+    """Return the middles of occupied cells beside a free one within a square, float64 (N, 2), grid frame."""
+    rows, cols = occupancy.shape
+    row0 = max(1, math.floor((centre_y - radius - origin_y) / resolution))
+    row1 = min(rows - 1, math.ceil((centre_y + radius - origin_y) / resolution))
+    col0 = max(1, math.floor((centre_x - radius - origin_x) / resolution))
+    col1 = min(cols - 1, math.ceil((centre_x + radius - origin_x) / resolution))
+    out = np.empty((max(0, row1 - row0) * max(0, col1 - col0), 2))
+    count = 0
+    for r in range(row0, row1):
+        for c in range(col0, col1):
+            if occupancy[r, c] < occupied_from:
+                continue
+            free = False
+            for dr, dc in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                value = occupancy[r + dr, c + dc]
+                free |= 0 <= value < occupied_from // 2 + 1
+            if free:
+                out[count, 0] = origin_x + (c + 0.5) * resolution
+                out[count, 1] = origin_y + (r + 0.5) * resolution
+                count += 1
+    return out[:count].copy()
+
+
+@njit(nogil=True, cache=True)
+def nearest_field(
+    targets: Values, low_x: float, low_y: float, cell: float, size: int, reach: float
+) -> Indices:
+    """Return for each cell (size, size) the index of a nearest target, -1 beyond `reach` metres.
+
+    Two sweeps of vector propagation (Danielsson 1980): right to a fraction of a cell.
+    """
+    field = np.full((size, size), -1, np.int32)
+    for k in range(targets.shape[0]):
+        c = math.floor((targets[k, 0] - low_x) / cell)
+        r = math.floor((targets[k, 1] - low_y) / cell)
+        if 0 <= r < size and 0 <= c < size:
+            field[r, c] = k
+    for sweep in range(2):
+        for step in range(size):
+            r = step if sweep == 0 else size - 1 - step
+            for side in range(2):
+                for across in range(size):
+                    c = across if side == 0 else size - 1 - across
+                    x, y = low_x + (c + 0.5) * cell, low_y + (r + 0.5) * cell
+                    best = field[r, c]
+                    best_sq = reach * reach
+                    if best >= 0:
+                        best_sq = (targets[best, 0] - x) ** 2 + (targets[best, 1] - y) ** 2
+                    dr = -1 if sweep == 0 else 1
+                    dc = -1 if side == 0 else 1
+                    for a, b in ((dr, 0), (0, dc), (dr, dc), (dr, -dc)):
+                        if 0 <= r + a < size and 0 <= c + b < size:
+                            k = field[r + a, c + b]
+                            if k >= 0:
+                                sq = (targets[k, 0] - x) ** 2 + (targets[k, 1] - y) ** 2
+                                if sq < best_sq:
+                                    best, best_sq = k, sq
+                    field[r, c] = best
+    return field
+
+
+@njit(nogil=True, cache=True)
+def fit(
+    points: Singles,
+    targets: Values,
+    field: Indices,
+    low_x: float,
+    low_y: float,
+    cell: float,
+    pose: Values,
+    sigma: float,
+) -> float:
+    """Return how well points fit at a pose, 0..1: mean of exp(-d^2 / 2 sigma^2) to the nearest targets."""
+    size = field.shape[0]
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    total = 0.0
+    for k in range(points.shape[0]):
+        x = pose[0] + cos * points[k, 0] - sin * points[k, 1]
+        y = pose[1] + sin * points[k, 0] + cos * points[k, 1]
+        c, r = math.floor((x - low_x) / cell), math.floor((y - low_y) / cell)
+        if 0 <= r < size and 0 <= c < size and field[r, c] >= 0:
+            t = field[r, c]
+            sq = (targets[t, 0] - x) ** 2 + (targets[t, 1] - y) ** 2
+            total += math.exp(-0.5 * sq / (sigma * sigma))
+    return float(total / max(1, points.shape[0]))
+
+
+@njit(nogil=True, cache=True)
+def search(
+    points: Singles,
+    targets: Values,
+    field: Indices,
+    low_x: float,
+    low_y: float,
+    cell: float,
+    centre: Values,
+    half_m: float,
+    step_m: float,
+    half_rad: float,
+    step_rad: float,
+    sigma: float,
+) -> Values:
+    """Return the best pose of a regular search around a centre, float64 (4,): pose and its fit."""
+    shifts, turns = math.ceil(half_m / step_m), math.ceil(half_rad / step_rad)
+    best = np.empty(4)
+    best[3] = -1.0
+    pose = np.empty(3)
+    for t in range(-turns, turns + 1):
+        pose[2] = centre[2] + t * step_rad
+        for i in range(-shifts, shifts + 1):
+            pose[0] = centre[0] + i * step_m
+            for j in range(-shifts, shifts + 1):
+                pose[1] = centre[1] + j * step_m
+                value = fit(points, targets, field, low_x, low_y, cell, pose, sigma)
+                if value > best[3]:
+                    best[:3] = pose
+                    best[3] = value
+    return best
+
+
+@njit(nogil=True, cache=True)
+def refine_system(
+    points: Singles,
+    normals: Singles,
+    straightness: Singles,
+    targets: Values,
+    field: Indices,
+    low_x: float,
+    low_y: float,
+    cell: float,
+    pose: Values,
+    sigma: float,
+) -> tuple[Values, Values, float, float]:
+    """Return (H, g, sum of weights, weighted squared error) of one point-to-line Gauss-Newton step.
+
+    Axes: x and y of the grid frame and the yaw of the place about its own origin. Where the boundary has no
+    direction the point itself is matched. Cauchy weights at `sigma`.
+    """
+    size = field.shape[0]
+    H, g = np.zeros((3, 3)), np.zeros(3)
+    J = np.empty(3)
+    total, error = 0.0, 0.0
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(points.shape[0]):
+        px, py = cos * points[k, 0] - sin * points[k, 1], sin * points[k, 0] + cos * points[k, 1]
+        c = math.floor((pose[0] + px - low_x) / cell)
+        r = math.floor((pose[1] + py - low_y) / cell)
+        if not (0 <= r < size and 0 <= c < size) or field[r, c] < 0:
+            continue
+        t = field[r, c]
+        dx, dy = pose[0] + px - targets[t, 0], pose[1] + py - targets[t, 1]
+        nx, ny = (
+            cos * normals[k, 0] - sin * normals[k, 1],
+            sin * normals[k, 0] + cos * normals[k, 1],
+        )
+        for axis in range(2):
+            strength = 1.0
+            if axis == 1:
+                nx, ny = -ny, nx
+                strength = 1.0 - straightness[k]
+                if strength < 0.3:
+                    continue
+            e = nx * dx + ny * dy
+            weight = strength / (1.0 + (e / sigma) ** 2)
+            J[0], J[1], J[2] = nx, ny, -nx * py + ny * px
+            for p in range(3):
+                g[p] += weight * J[p] * e
+                for q in range(3):
+                    H[p, q] += weight * J[p] * J[q]
+            total += weight
+            error += weight * e * e
+    return H, g, total, error
+
+
+@njit(nogil=True, cache=True)
+def explained(
+    points: Singles,
+    targets: Values,
+    field: Indices,
+    low_x: float,
+    low_y: float,
+    cell: float,
+    pose: Values,
+    within: float,
+    occupancy: Cells,
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+) -> tuple[int, int]:
+    """Return (points the window knows about, those of them with a target within `within` metres)."""
+    size = field.shape[0]
+    rows, cols = occupancy.shape
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    known, near = 0, 0
+    for k in range(points.shape[0]):
+        x = pose[0] + cos * points[k, 0] - sin * points[k, 1]
+        y = pose[1] + sin * points[k, 0] + cos * points[k, 1]
+        i, j = math.floor((y - origin_y) / resolution), math.floor((x - origin_x) / resolution)
+        c, r = math.floor((x - low_x) / cell), math.floor((y - low_y) / cell)
+        if 0 <= r < size and 0 <= c < size and field[r, c] >= 0:
+            t = field[r, c]
+            if (targets[t, 0] - x) ** 2 + (targets[t, 1] - y) ** 2 <= within * within:
+                known += 1
+                near += 1
+                continue
+        if 0 <= i < rows and 0 <= j < cols and occupancy[i, j] >= 0:
+            known += 1
+    return known, near

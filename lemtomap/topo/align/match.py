@@ -1,0 +1,151 @@
+"""Local grid map transform (thesis, section 3-3-2): align a node's localisation data with the window.
+
+In 2014 this came from ground truth. Here: a coarse search as wide as the graph's prediction is uncertain,
+then point-to-line Gauss-Newton with the prediction as prior, so that what the boundary cannot tell (the way
+along a corridor) follows the graph; then a gate on how much of what should be seen is seen.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose, adjoint, between, wrap_angle
+from lemtomap.topo.align import kernels
+from lemtomap.topo.graph import Covariance
+from lemtomap.topo.place import Boundary
+from lemtomap.types import GridView
+
+
+@dataclass(frozen=True, slots=True)
+class MatchConfig:
+    """What a match must show to be believed."""
+
+    least_points: int = 40  # boundary points the window must know about
+    least_share: float = 0.3  # and the share of the place's points these must be
+    least_score: float = 0.6  # share of them that has a hit within `near_m`
+    near_m: float = 0.12  # two coding cells' half widths
+    gate_sigmas: float = 4.0  # from the prediction, Mahalanobis
+    sigma_m: float = 0.05  # scatter of boundary points about hits: half a coding cell
+    coarse_sigma_m: float = 0.15  # for the search: as wide as its step
+    points_per_look: float = 8.0  # neighbouring points err together; so many count as one
+    max_search_m: float = 0.6  # wider than this it is loop closing's business
+    max_search_rad: float = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """Where the place stands in the window, or why that is not known."""
+
+    T_grid_node: Pose
+    covariance: Covariance
+    """float64 (3, 3), axes of the node, the prediction's information included."""
+    score: float
+    """Share of what the window knows of the place that fits, 0..1."""
+    refused: str = ""
+    """Why the match is not believed; empty when it is."""
+
+
+FIELD_REACH_M = 0.4
+FIELD_CELL_M = 0.05
+ITERATIONS = 15
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    targets: NDArray[np.float64]
+    nearest: NDArray[np.int32]
+    low: tuple[float, float]
+
+    @property
+    def plan(self) -> tuple[NDArray[np.float64], NDArray[np.int32], float, float, float]:
+        return self.targets, self.nearest, self.low[0], self.low[1], FIELD_CELL_M
+
+
+def match_place(
+    boundary: Boundary,
+    hits_grid: NDArray[np.float64],
+    grid: GridView,
+    predicted: tuple[Pose, Covariance],
+    config: MatchConfig,
+) -> Match:
+    """Align a place with hits, float64 (N, 2), metres, grid frame.
+
+    `predicted` is T_grid_node and its covariance, float64 (3, 3) in axes of the node. Holds: a refused match
+    returns exactly the prediction.
+    """
+    start, covariance = predicted
+    if len(boundary.points) < config.least_points or len(hits_grid) < config.least_points:
+        return Match(start, covariance, 0.0, "too little to match")
+    field = _field(hits_grid, start, boundary.radius_m + 1.0)
+    coarse = _searched(boundary, field, start, covariance, config)
+    T_grid_node, posterior = _refined(boundary, field, coarse, predicted, config)
+    window = (grid.occupancy, grid.resolution_m, *grid.origin_m)
+    known, near = kernels.explained(boundary.points, *field.plan, T_grid_node, config.near_m, *window)
+    score = near / max(1, known)
+    refused = _doubts(between(start, T_grid_node), covariance, known, score, len(boundary.points), config)
+    if refused:
+        return Match(start, covariance, score, refused)
+    return Match(T_grid_node, posterior, score)
+
+
+def _field(targets: NDArray[np.float64], centre: Pose, half_m: float) -> _Field:
+    low = (float(centre[0] - half_m), float(centre[1] - half_m))
+    size = round(2.0 * half_m / FIELD_CELL_M)
+    nearest = kernels.nearest_field(targets, *low, FIELD_CELL_M, size, FIELD_REACH_M)
+    return _Field(targets, nearest, low)
+
+
+def _searched(
+    boundary: Boundary, field: _Field, start: Pose, covariance: Covariance, config: MatchConfig
+) -> Pose:
+    """Return the best start for the refinement within the prediction's three sigmas."""
+    half_m = min(3.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1])), config.max_search_m)
+    half_rad = min(3.0 * float(np.sqrt(covariance[2, 2])), config.max_search_rad)
+    step_m, step_rad = 0.1, 0.04  # a boundary point 5 m away moves 0.2 m: twice the step, within the field
+    if half_m < step_m and half_rad < step_rad:
+        return start
+    sigma_m = config.coarse_sigma_m
+    best = kernels.search(boundary.points, *field.plan, start, half_m, step_m, half_rad, step_rad, sigma_m)
+    return np.array(best[:3])
+
+
+def _refined(
+    boundary: Boundary,
+    field: _Field,
+    start: Pose,
+    predicted: tuple[Pose, Covariance],
+    config: MatchConfig,
+) -> tuple[Pose, Covariance]:
+    """Return the pose of least error and its covariance in axes of the node."""
+    prior_pose, prior_covariance = predicted
+    turn = adjoint(np.array([0.0, 0.0, prior_pose[2]]))
+    prior = np.linalg.inv(turn @ prior_covariance @ turn.T)
+    shape = (boundary.points, boundary.normals, boundary.straightness)
+    pose = np.array(start, dtype=np.float64)
+    H = prior
+    for _ in range(ITERATIONS):
+        seen, g, weight, error = kernels.refine_system(*shape, *field.plan, pose, config.sigma_m)
+        scatter_sq = max(error / max(weight, 1.0), (0.4 * config.sigma_m) ** 2) * config.points_per_look
+        H = seen / scatter_sq + prior
+        off = pose - prior_pose
+        off[2] = wrap_angle(off[2])
+        step = np.linalg.solve(H, g / scatter_sq + prior @ off)
+        pose = pose - step
+        if float(np.max(np.abs(step))) < 1e-5:
+            break
+    turn = adjoint(np.array([0.0, 0.0, -pose[2]]))
+    pose[2] = wrap_angle(pose[2])
+    return pose, np.asarray(turn @ np.linalg.inv(H) @ turn.T)
+
+
+def _doubts(
+    moved: Pose, covariance: Covariance, known: int, score: float, points: int, config: MatchConfig
+) -> str:
+    if known < max(config.least_points, config.least_share * points):
+        return "the window knows too little of the place"
+    if score < config.least_score:
+        return f"only {score:.0%} of the place is seen"
+    if float(moved @ np.linalg.solve(covariance, moved)) > config.gate_sigmas**2:
+        return "too far from where the graph expects it"
+    return ""
