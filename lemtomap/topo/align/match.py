@@ -121,11 +121,17 @@ def _refined(
     prior_pose, prior_covariance = predicted
     turn = adjoint(np.array([0.0, 0.0, prior_pose[2]]))
     prior = np.linalg.inv(turn @ prior_covariance @ turn.T)
-    shape = (boundary.points, boundary.normals, boundary.straightness)
     pose = np.array(start, dtype=np.float64)
     H = prior
     for _ in range(ITERATIONS):
-        seen, g, weight, error = kernels.refine_system(*shape, *field.plan, pose, config.sigma_m)
+        seen, g, weight, error = kernels.refine_system(
+            boundary.points,
+            boundary.normals,
+            boundary.straightness,
+            *field.plan,
+            pose=pose,
+            sigma=config.sigma_m,
+        )
         scatter_sq = max(error / max(weight, 1.0), (0.4 * config.sigma_m) ** 2) * config.points_per_look
         H = seen / scatter_sq + prior
         off = pose - prior_pose

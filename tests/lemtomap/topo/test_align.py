@@ -91,7 +91,7 @@ def test_the_hit_map_forgets_what_lies_a_map_size_behind():
         hits.add(pose(0.2 * k, 0, 0), transform(inverse(pose(0.2 * k, 0, 0)), points))
     grid = window_of(points)
     assert len(hits.around((0.0, 0.0), 6.0, grid, 50)) > 300
-    far = points + [24.0, 0.0]
+    far = points + np.array([24.0, 0.0])
     for k in range(3):
         hits.add(pose(24.0 + 0.2 * k, 0, 0), transform(inverse(pose(24.0 + 0.2 * k, 0, 0)), far))
     assert len(hits.around((0.0, 0.0), 6.0, grid, 50)) == 0
