@@ -1,1 +1,394 @@
-"""Jitted functions of the rolling window on plain arrays."""
+"""Kernels of the map: ring-buffer windows in, ring-buffer windows out. Plain arrays, no classes.
+
+A window is n x n cells. Cell (gx, gy) of the endless grid lies at row gy mod n, column gx mod n, so that a
+shift moves nothing. `origin` holds (gx, gy) of the window's least corner. A `window` is the tuple of its
+arrays.
+
+evidence  int8 (n, n)        0 never seen, negative free, positive occupied; bounded on both sides
+averaged  uint8 (n, n)       hits in the mean, saturates
+mean      float32 (n, n, 2) averaged hit point from the cell's corner, metres
+nearest   uint8 (n, n)       index into `offsets` (sorted by distance) of the nearest occupied cell; 255 none
+normal    uint8 (n, n)       surface normal of an occupied cell, 180 / 255 degrees a step; 255 no plane
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+NONE = 255
+MIN_PLANE_POINTS = 4
+PLANE_RADIUS = 3
+PLANE_RATIO = 0.12
+
+
+@njit(nogil=True, cache=True)
+def prepare_scan(
+    ranges: Array,
+    directions: Array,
+    T_base_laser: Array,
+    motion: tuple[float, float, float],
+    limits: tuple[float, float],
+    hits: Array,
+    cuts: Array,
+) -> tuple[int, int]:
+    """Turn beams into points in base at the first beam's time; return (number of hits, number of cuts).
+
+    motion: v m/s, w rad/s, s between beams. limits: least range, usable range; a beam that goes beyond the
+    usable range is cut there and proves only free space. directions, hits, cuts: (N, 2).
+    """
+    cos_l, sin_l = math.cos(T_base_laser[2]), math.sin(T_base_laser[2])
+    v, w, time_step = motion[0], motion[1], motion[2]
+    skewed = time_step != 0.0 and (v != 0.0 or w != 0.0)
+    hit_count = cut_count = 0
+    for i in range(ranges.shape[0]):
+        r = ranges[i]
+        if math.isnan(r) or r < limits[0]:
+            continue
+        is_hit = r < limits[1]
+        if not is_hit:
+            r = limits[1]
+        lx, ly = r * directions[i, 0], r * directions[i, 1]
+        x = T_base_laser[0] + cos_l * lx - sin_l * ly
+        y = T_base_laser[1] + sin_l * lx + cos_l * ly
+        if skewed:
+            turn, way = w * time_step * i, v * time_step * i
+            c, s = math.cos(turn), math.sin(turn)
+            x, y = (
+                way * math.cos(0.5 * turn) + c * x - s * y,
+                way * math.sin(0.5 * turn) + s * x + c * y,
+            )
+        if is_hit:
+            hits[hit_count, 0], hits[hit_count, 1] = x, y
+            hit_count += 1
+        else:
+            cuts[cut_count, 0], cuts[cut_count, 1] = x, y
+            cut_count += 1
+    return hit_count, cut_count
+
+
+@njit(nogil=True, cache=True)
+def outside(points: Array, pose: Array, origin: Array, n: int, resolution: float) -> bool:
+    """Tell whether the robot or a point falls outside the window."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for i in range(points.shape[0]):
+        x = pose[0] + c * points[i, 0] - s * points[i, 1]
+        y = pose[1] + s * points[i, 0] + c * points[i, 1]
+        col = math.floor(x / resolution) - origin[0]
+        row = math.floor(y / resolution) - origin[1]
+        if col < 0 or row < 0 or col >= n or row >= n:
+            return True
+    col = math.floor(pose[0] / resolution) - origin[0]
+    row = math.floor(pose[1] / resolution) - origin[1]
+    return bool(col < 0 or row < 0 or col >= n or row >= n)
+
+
+@njit(nogil=True, cache=True)
+def _renew_nearest(
+    evidence: Array, nearest: Array, offsets: Array, n: int, origin: Array, gx: int, gy: int
+) -> None:
+    """Search the nearest occupied cell anew."""
+    found = NONE
+    for o in range(offsets.shape[0]):
+        cx, cy = gx + offsets[o, 0], gy + offsets[o, 1]
+        if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
+            continue
+        if evidence[cy % n, cx % n] > 0:
+            found = o
+            break
+    nearest[gy % n, gx % n] = found
+
+
+@njit(nogil=True, cache=True)
+def _spread_new(nearest: Array, offsets: Array, n: int, origin: Array, gx: int, gy: int) -> None:
+    """A cell became occupied: it may be the nearest of the cells around it."""
+    for o in range(offsets.shape[0]):
+        cx, cy = gx - offsets[o, 0], gy - offsets[o, 1]
+        if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
+            continue
+        row, col = cy % n, cx % n
+        nearest[row, col] = min(nearest[row, col], o)
+
+
+@njit(nogil=True, cache=True)
+def _orphan(
+    nearest: Array, offsets: Array, n: int, origin: Array, gx: int, gy: int, orphans: Array, count: int
+) -> int:
+    """A cell is no longer occupied: list the cells whose nearest it was."""
+    for o in range(offsets.shape[0]):
+        cx, cy = gx - offsets[o, 0], gy - offsets[o, 1]
+        if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
+            continue
+        row, col = cy % n, cx % n
+        if nearest[row, col] == o and count < orphans.shape[0]:
+            nearest[row, col] = NONE
+            orphans[count, 0], orphans[count, 1] = cx, cy
+            count += 1
+    return count
+
+
+@njit(nogil=True, cache=True)
+def _renew_normal(
+    evidence: Array, mean: Array, normal: Array, n: int, origin: Array, resolution: float, gx: int, gy: int
+) -> None:
+    """Fit a plane through the averaged hit points around an occupied cell."""
+    k = 0
+    sx = sy = sxx = sxy = syy = 0.0
+    for dy in range(-PLANE_RADIUS, PLANE_RADIUS + 1):
+        cy = gy + dy
+        if cy < origin[1] or cy >= origin[1] + n:
+            continue
+        row = cy % n
+        for dx in range(-PLANE_RADIUS, PLANE_RADIUS + 1):
+            cx = gx + dx
+            if cx < origin[0] or cx >= origin[0] + n:
+                continue
+            col = cx % n
+            if evidence[row, col] > 0:
+                x = dx * resolution + mean[row, col, 0]
+                y = dy * resolution + mean[row, col, 1]
+                k += 1
+                sx += x
+                sy += y
+                sxx += x * x
+                sxy += x * y
+                syy += y * y
+    normal[gy % n, gx % n] = NONE
+    if k < MIN_PLANE_POINTS:
+        return
+    sxx = sxx / k - sx / k * sx / k
+    sxy = sxy / k - sx / k * sy / k
+    syy = syy / k - sy / k * sy / k
+    half = 0.5 * (sxx - syy)
+    root = math.sqrt(half * half + sxy * sxy)
+    middle = 0.5 * (sxx + syy)
+    if middle - root > PLANE_RATIO * (middle + root):
+        return
+    along = 0.5 * math.atan2(sxy, half)
+    angle = (along + 0.5 * math.pi) % math.pi
+    normal[gy % n, gx % n] = int(angle * 255.0 / math.pi + 0.5) % 255
+
+
+@njit(nogil=True, cache=True)
+def _average_hit(averaged: Array, mean: Array, row: int, col: int, x: float, y: float, bound: int) -> None:
+    k = averaged[row, col]
+    if k < bound:
+        k += 1
+        averaged[row, col] = k
+    mean[row, col, 0] += (x - mean[row, col, 0]) / k
+    mean[row, col, 1] += (y - mean[row, col, 1]) / k
+
+
+@njit(nogil=True, cache=True)
+def _clear_ray(
+    evidence: Array,
+    averaged: Array,
+    mark: Array,
+    tag: int,
+    n: int,
+    origin: Array,
+    ray: Array,
+    miss: int,
+    floor: int,
+    resolution: float,
+    lost: Array,
+    lost_count: int,
+) -> int:
+    """Lower every cell between laser and end point that this scan has not touched yet."""
+    x0, y0, x1, y1 = ray[0] / resolution, ray[1] / resolution, ray[2] / resolution, ray[3] / resolution
+    gx, gy = math.floor(x0), math.floor(y0)
+    end_x, end_y = math.floor(x1), math.floor(y1)
+    dx, dy = x1 - x0, y1 - y0
+    step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
+    per_x = abs(1.0 / dx) if dx != 0.0 else 1e30
+    per_y = abs(1.0 / dy) if dy != 0.0 else 1e30
+    next_x = ((gx + 1 - x0) if dx > 0 else (x0 - gx)) * per_x
+    next_y = ((gy + 1 - y0) if dy > 0 else (y0 - gy)) * per_y
+    for _ in range(abs(end_x - gx) + abs(end_y - gy)):
+        col, row = gx - origin[0], gy - origin[1]
+        if col < 0 or row < 0 or col >= n or row >= n:
+            return lost_count
+        row, col = gy % n, gx % n
+        if mark[row, col] != tag:
+            mark[row, col] = tag
+            before = evidence[row, col]
+            after = before - miss
+            if after == 0:
+                after = -1
+            after = max(after, floor)
+            evidence[row, col] = after
+            if before > 0 and after <= 0:
+                averaged[row, col] = 0
+                lost[lost_count, 0], lost[lost_count, 1] = gx, gy
+                lost_count += 1
+        if next_x < next_y:
+            gx += step_x
+            next_x += per_x
+        else:
+            gy += step_y
+            next_y += per_y
+    return lost_count
+
+
+@njit(nogil=True, cache=True)
+def integrate(
+    window: Any,
+    offsets: Array,
+    mark: Array,
+    tag: int,
+    hits: Array,
+    cuts: Array,
+    T_grid_base: Array,
+    laser: Array,
+    rules: Array,
+    resolution: float,
+    scratch: Array,
+) -> None:
+    """Put a scan into one window: hits first, then the free space before them; a cell moves at most once.
+
+    rules int64: hit, miss, floor, ceiling, bound of the mean. laser (2,) in base, metres. scratch int64
+    (3, many, 2).
+    """
+    evidence, averaged, mean = window.evidence, window.averaged, window.mean
+    nearest, normal, origin = window.nearest, window.normal, window.origin
+    n = evidence.shape[0]
+    hit, miss, floor, ceiling, bound = rules[0], rules[1], rules[2], rules[3], rules[4]
+    c, s = math.cos(T_grid_base[2]), math.sin(T_grid_base[2])
+    touched, lost, orphans = scratch[0], scratch[1], scratch[2]
+    touched_count = lost_count = orphan_count = 0
+    for i in range(hits.shape[0]):
+        x = T_grid_base[0] + c * hits[i, 0] - s * hits[i, 1]
+        y = T_grid_base[1] + s * hits[i, 0] + c * hits[i, 1]
+        gx, gy = math.floor(x / resolution), math.floor(y / resolution)
+        if gx < origin[0] or gy < origin[1] or gx >= origin[0] + n or gy >= origin[1] + n:
+            continue
+        row, col = gy % n, gx % n
+        if mark[row, col] != tag:
+            mark[row, col] = tag
+            before = evidence[row, col]
+            after = min(before + hit, ceiling)
+            if after == 0:
+                after = 1
+            evidence[row, col] = after
+            touched[touched_count, 0], touched[touched_count, 1] = gx, gy
+            touched_count += 1
+            if before <= 0:
+                averaged[row, col] = 0
+                if after > 0:
+                    _spread_new(nearest, offsets, n, origin, gx, gy)
+        _average_hit(averaged, mean, row, col, x - gx * resolution, y - gy * resolution, bound)
+    ray = np.empty(4)
+    ray[0] = T_grid_base[0] + c * laser[0] - s * laser[1]
+    ray[1] = T_grid_base[1] + s * laser[0] + c * laser[1]
+    for i in range(hits.shape[0] + cuts.shape[0]):
+        if i < hits.shape[0]:
+            px, py = hits[i, 0], hits[i, 1]
+        else:
+            px, py = cuts[i - hits.shape[0], 0], cuts[i - hits.shape[0], 1]
+        ray[2] = T_grid_base[0] + c * px - s * py
+        ray[3] = T_grid_base[1] + s * px + c * py
+        lost_count = _clear_ray(
+            evidence, averaged, mark, tag, n, origin, ray, miss, floor, resolution, lost, lost_count
+        )
+    for i in range(lost_count):
+        orphan_count = _orphan(nearest, offsets, n, origin, lost[i, 0], lost[i, 1], orphans, orphan_count)
+    for i in range(orphan_count):
+        _renew_nearest(evidence, nearest, offsets, n, origin, orphans[i, 0], orphans[i, 1])
+    for i in range(touched_count):
+        gx, gy = touched[i, 0], touched[i, 1]
+        if evidence[gy % n, gx % n] > 0:
+            _renew_normal(evidence, mean, normal, n, origin, resolution, gx, gy)
+
+
+@njit(nogil=True, cache=True)
+def shift(window: Any, offsets: Array, new_x: int, new_y: int) -> None:
+    """Move the window: clear what enters, repair the look-up beside it, touch nothing else."""
+    evidence, averaged, nearest = window.evidence, window.averaged, window.nearest
+    normal, origin = window.normal, window.origin
+    n = evidence.shape[0]
+    old_x, old_y = origin[0], origin[1]
+    origin[0], origin[1] = new_x, new_y
+    reach = 0
+    for o in range(offsets.shape[0]):
+        reach = max(reach, offsets[o, 0])
+    for gy in range(new_y, new_y + n):
+        row_is_new = gy < old_y or gy >= old_y + n
+        for gx in range(new_x, new_x + n):
+            if row_is_new or gx < old_x or gx >= old_x + n:
+                row, col = gy % n, gx % n
+                evidence[row, col] = 0
+                averaged[row, col] = 0
+                nearest[row, col] = NONE
+                normal[row, col] = NONE
+    for gy in range(new_y, new_y + n):
+        row_is_deep = gy >= max(old_y, new_y) + reach and gy < min(old_y, new_y) + n - reach
+        for gx in range(new_x, new_x + n):
+            if row_is_deep and gx >= max(old_x, new_x) + reach and gx < min(old_x, new_x) + n - reach:
+                continue
+            if gx < old_x - reach or gx >= old_x + n + reach or gy < old_y - reach or gy >= old_y + n + reach:
+                continue
+            _renew_nearest(evidence, nearest, offsets, n, origin, gx, gy)
+
+
+@njit(nogil=True, cache=True)
+def occupancy(evidence: Array, origin: Array, table: Array, out: Array) -> None:
+    """Write the window as -1 unknown, 0..100 occupied, [0, 0] at its least corner; table: int8 (256,) by
+    evidence + 128.
+    """
+    n = evidence.shape[0]
+    for row in range(n):
+        source = (origin[1] + row) % n
+        start = origin[0] % n
+        for col in range(n):
+            at = start + col
+            if at >= n:
+                at -= n
+            out[row, col] = table[evidence[source, at] + 128]
+
+
+@njit(nogil=True, cache=True)
+def occupied_points(evidence: Array, mean: Array, origin: Array, resolution: float, out: Array) -> int:
+    """Write the averaged hit point of each occupied cell, grid frame, metres; return how many."""
+    n = evidence.shape[0]
+    k = 0
+    for gy in range(origin[1], origin[1] + n):
+        row = gy % n
+        for gx in range(origin[0], origin[0] + n):
+            col = gx % n
+            if evidence[row, col] > 0 and k < out.shape[0]:
+                out[k, 0] = gx * resolution + mean[row, col, 0]
+                out[k, 1] = gy * resolution + mean[row, col, 1]
+                k += 1
+    return k
+
+
+@njit(nogil=True, cache=True)
+def paste(
+    window: Any,
+    offsets: Array,
+    gx: int,
+    gy: int,
+    evidence: Array,
+    averaged: Array,
+    mean: Array,
+    normal: Array,
+) -> None:
+    """Put a remembered square of cells, least corner at (gx, gy), into unknown cells; the look-up learns
+    of it.
+    """
+    n = window.evidence.shape[0]
+    for dy in range(evidence.shape[0]):
+        row = (gy + dy) % n
+        for dx in range(evidence.shape[1]):
+            col = (gx + dx) % n
+            window.evidence[row, col] = evidence[dy, dx]
+            window.averaged[row, col] = averaged[dy, dx]
+            window.mean[row, col, 0] = mean[dy, dx, 0]
+            window.mean[row, col, 1] = mean[dy, dx, 1]
+            window.normal[row, col] = normal[dy, dx]
+            if evidence[dy, dx] > 0:
+                _spread_new(window.nearest, offsets, n, window.origin, gx + dx, gy + dy)

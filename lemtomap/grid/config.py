@@ -1,0 +1,85 @@
+"""Settings of the rolling-window SLAM, each with its unit and where its value comes from."""
+
+from dataclasses import dataclass
+
+from lemtomap.errors import BadSetting
+
+
+@dataclass(frozen=True, slots=True)
+class SlamConfig:
+    """One parameter set for every robot and log; raises BadSetting when it cannot work.
+
+    Values without another source were measured over the Intel, ACES, Killian and URG-04LX logs together.
+    """
+
+    particles: int = 5  # thesis 3-4: "3 to 10 should suffice"
+    window_m: float = 20.0  # W of algorithm E-4
+    resolution_m: float = 0.05
+    max_range_m: float | None = None  # usable range; None: the smaller of the sensor's range and W/2
+
+    # when a scan is matched, and when it goes into the window
+    match_distance_m: float = 0.02
+    match_turn_rad: float = 0.0175
+    integrate_distance_m: float = 0.3
+    integrate_turn_rad: float = 0.35
+    integrate_period_s: float = 1.0  # a standing robot still learns that a door opened
+
+    # evidence of one scan on one cell, and its bounds: a moved chair is learnt within a few integrations,
+    # one hit makes a cell occupied even where it was free, one miss takes that back
+    evidence_hit: int = 6
+    evidence_miss: int = 2
+    evidence_floor: int = -5
+    evidence_ceiling: int = 12
+    hits_averaged: int = 15
+
+    # match: point to line against averaged hits
+    match_sigma_m: float = 0.08  # reach of the robust weight
+    match_noise_m: float = 0.03  # of one beam, widened because beams err together
+    point_share: float = 0.05  # of a plane's information that also holds along it
+    degenerate_below: float = 0.18  # diversity (Appendix D) under which the weak axis follows odometry
+    min_points: int = 20
+    min_quality: float = 0.25  # a worse match is refused
+    climb_below: float = 0.75  # quality under which the hill climb is tried too
+    large_turn_rad: float = 0.3  # odometry that turns more between two scans is searched all round
+
+    # odometry since the previous match: floor plus share of the motion; tight in translation, loose in
+    # rotation
+    odometry_floor_m: float = 0.01
+    odometry_floor_rad: float = 0.02
+    odometry_m_per_m: float = 0.05
+    odometry_rad_per_rad: float = 0.2
+    odometry_m_per_rad: float = 0.02
+    odometry_rad_per_m: float = 0.03
+
+    # particles
+    sample_share: float = 0.5  # of the proposal's standard deviation that is sampled
+    weight_per_quality: float = 40.0  # log weight for the whole step from quality 0 to 1
+    resample_below: float = 0.5  # effective particles as a share of all
+
+    # what is published
+    smooth_m: float = 0.03  # the correction moves at most this far per scan
+    smooth_rad: float = 0.0087
+    jump_m: float = 0.3  # a larger gap is closed at once and flagged
+    jump_rad: float = 0.17
+
+    def __post_init__(self) -> None:
+        if self.max_range_m is not None and not 0.0 < self.max_range_m <= self.window_m / 2.0:
+            raise BadSetting(
+                f"max range {self.max_range_m} m with a window of {self.window_m} m: "
+                "the window must be at least twice as wide as the range"
+            )
+        if self.resolution_m <= 0.0 or self.window_m < 20 * self.resolution_m:
+            raise BadSetting(
+                f"window {self.window_m} m with cells of {self.resolution_m} m has no room for a map"
+            )
+        if self.particles < 1:
+            raise BadSetting(f"particles {self.particles}: at least 1 is needed")
+
+    @property
+    def cells(self) -> int:
+        """Return the number of cells along one side of the window."""
+        return round(self.window_m / self.resolution_m)
+
+    def usable_range_m(self, sensor_range_m: float) -> float:
+        """Return the range up to which a beam is used, never more than half the window."""
+        return min(sensor_range_m, self.max_range_m or sensor_range_m, self.window_m / 2.0)

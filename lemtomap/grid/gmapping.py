@@ -1,0 +1,115 @@
+"""Rolling-window GMapping (thesis 3-4, algorithm E-4; Grisetti, Stachniss, Burgard 2007).
+
+Each particle is a pose, a weight and a window. Between integrations the best particle's window tracks
+every scan; at an integration each particle follows the tracked motion, matches against its own window, and
+samples its pose from the Gaussian around that match, the motion prior included.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.grid import particles
+from lemtomap.grid.config import SlamConfig
+from lemtomap.grid.mapper import Tracker
+from lemtomap.grid.matching import Match
+from lemtomap.grid.motion import between, compose, inverted, odometry_motion, rotated
+from lemtomap.grid.scan import Beams
+from lemtomap.grid.window import Window
+from lemtomap.se2 import Pose
+
+
+@dataclass(slots=True)
+class Particle:
+    """One hypothesis; the window may be shared with its siblings until it is written."""
+
+    T_grid_base: Pose
+    log_weight: float
+    window: Window
+
+
+class RollingGmapping(Tracker):
+    """N particles with copy-on-write windows; memory is all taken at the start."""
+
+    def __init__(self, config: SlamConfig, seed: int = 0) -> None:
+        super().__init__(config, seed)
+        self._rng = np.random.default_rng(seed)
+        self._windows = [self._new_window() for _ in range(config.particles)]
+        self._particles = [Particle(np.zeros(3), 0.0, self._windows[0]) for _ in range(config.particles)]
+        self._best = 0
+
+    def particles(self) -> NDArray[np.float64]:
+        """Return float64 (N, 3), T_grid_base of each particle now."""
+        if self._T_grid_base is None:
+            return np.zeros((0, 3))
+        since = between(self._particles[self._best].T_grid_base, self._T_grid_base)
+        return np.stack([compose(particle.T_grid_base, since) for particle in self._particles])
+
+    def _new_window(self) -> Window:
+        return Window(self.config, self._tables, self._scratch)
+
+    def _window(self) -> Window:
+        return self._particles[self._best].window
+
+    def _integrate(self, beams: Beams, match: Match | None) -> Pose:
+        assert self._T_grid_base is not None  # noqa: S101
+        if match is None:
+            for particle in self._particles:
+                particle.T_grid_base = self._T_grid_base
+        else:
+            self._move_and_weigh(beams, match)
+        for particle in self._particles:
+            self._own_window(particle)
+            self._roll_and_integrate(particle.window, beams, particle.T_grid_base)
+        self._choose_and_resample()
+        return self._particles[self._best].T_grid_base
+
+    def _roll_and_integrate(self, window: Window, beams: Beams, T_grid_base: Pose) -> None:
+        """Shift only when the scan falls outside (thesis 3-4), then integrate."""
+        if not window.holds(beams, T_grid_base):
+            window.shift_to(window.centred_origin(T_grid_base))
+        window.integrate(beams, T_grid_base)
+
+    def _move_and_weigh(self, beams: Beams, tracked: Match) -> None:
+        """Draw each pose from its proposal and weigh it by how well the scan fits its window (lines 7 to
+        16).
+        """
+        step = between(self._particles[self._best].T_grid_base, tracked.T_grid_base)
+        motion = odometry_motion(step, self.config)
+        for index, particle in enumerate(self._particles):
+            predicted = compose(particle.T_grid_base, motion.step)
+            prior = inverted(rotated(motion.covariance, float(predicted[2])))
+            match = tracked if index == self._best else self._match(beams, predicted, prior, particle.window)
+            particle.log_weight += (
+                self.config.weight_per_quality * match.diversity * (match.quality - tracked.quality)
+            )
+            if match.accepted:
+                particle.T_grid_base = self._draw(match, prior)
+            else:
+                particle.T_grid_base = predicted
+
+    def _draw(self, match: Match, prior: NDArray[np.float64]) -> Pose:
+        """Return a pose from the Gaussian around the match fused with the motion prior."""
+        covariance = inverted(match.information + prior)
+        noise = np.linalg.cholesky(covariance) @ self._rng.standard_normal(3)
+        return np.asarray(match.T_grid_base + self.config.sample_share * noise)
+
+    def _own_window(self, particle: Particle) -> None:
+        """Give the particle a window of its own before it is written (copy on write)."""
+        if sum(other.window is particle.window for other in self._particles) == 1:
+            return
+        used = {id(other.window) for other in self._particles}
+        free = next(window for window in self._windows if id(window) not in used)
+        free.copy_from(particle.window)
+        particle.window = free
+
+    def _choose_and_resample(self) -> None:
+        weights = particles.normalised(np.array([particle.log_weight for particle in self._particles]))
+        self._best = int(np.argmax(weights))
+        if particles.effective_number(weights) >= self.config.resample_below * len(weights):
+            return
+        parents = particles.resample(weights, self._rng)
+        best = self._particles[self._best]
+        self._particles = [replace(self._particles[parent], log_weight=0.0) for parent in parents]
+        self._best = next((i for i, p in enumerate(self._particles) if p.window is best.window), 0)

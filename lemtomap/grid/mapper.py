@@ -1,0 +1,203 @@
+"""What both policies share: every scan tracks the pose against the best window; some scans go into the
+windows.
+
+The thesis' figure for one scan: predict → match → weigh → integrate → resample → roll (algorithm E-4).
+"""
+
+import math
+from abc import ABC, abstractmethod
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.grid.config import SlamConfig
+from lemtomap.grid.matching import Match, Matcher
+from lemtomap.grid.motion import Motion, between, compose, inverted, odometry_motion, rotated
+from lemtomap.grid.publish import SmoothCorrection
+from lemtomap.grid.scan import Beams, ScanPreparer
+from lemtomap.grid.window import Scratch, Window, look_up
+from lemtomap.se2 import Pose, wrap_angle
+from lemtomap.types import GridView, Odometry, Scan, SlamUpdate
+
+
+class GridSlam(Protocol):
+    """A mapper of the metric layer."""
+
+    def update(self, scan: Scan, odometry: Odometry) -> SlamUpdate:
+        """Use one scan; call it for every scan. odometry: the base at the scan's stamp; its velocity
+        de-skews.
+        """
+        ...
+
+    def view(self) -> GridView:
+        """Return the best map."""
+        ...
+
+    def particles(self) -> NDArray[np.float64]:
+        """Return float64 (N, 3), T_grid_base of each particle."""
+        ...
+
+    def points_base(self) -> NDArray[np.float32]:
+        """Return the latest scan's hits, de-skewed, float32 (M, 2), metres, base frame."""
+        ...
+
+
+class Tracker(ABC):
+    """Follows every scan; leaves the windows to its subclasses."""
+
+    def __init__(self, config: SlamConfig, seed: int = 0) -> None:
+        self.config = config
+        self.seed = seed
+        self._tables = look_up(config.resolution_m)
+        self._scratch = Scratch(config.cells)
+        self._match = Matcher(config, self._tables)
+        self._prepare = ScanPreparer()
+        self._correction = SmoothCorrection(config)
+        self._T_grid_base: Pose | None = None
+        self._beams: Beams | None = None
+        self._pending = np.zeros(3)  # odometry since the last match
+        self._T_odom_base = np.zeros(3)
+        self._stamp_s = 0.0
+        self._T_grid_integrated = np.zeros(3)
+        self._integrated_s = -math.inf
+        self._integrated_scan_distance = 0.0
+        self._diversity = 0.0
+        self._quality = 0.0
+        self._covariance = np.zeros((3, 3))
+
+    # -- what subclasses say
+    # ---------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def _window(self) -> Window:
+        """Return the window that scans are tracked against."""
+
+    @abstractmethod
+    def _integrate(self, beams: Beams, match: Match | None) -> Pose:
+        """Put the scan into the window(s); return the best pose now."""
+
+    # -- GridSlam
+    # --------------------------------------------------------------------------------------------------
+
+    def update(self, scan: Scan, odometry: Odometry) -> SlamUpdate:
+        """Use one scan; see GridSlam.update."""
+        beams = self._prepare(scan, odometry, self.config.usable_range_m(scan.range_max_m))
+        self._beams, self._stamp_s = beams, scan.stamp_s
+        if self._T_grid_base is None:
+            return self._begin(beams, odometry)
+        step = between(self._T_odom_base, odometry.T_odom_base)
+        self._T_odom_base = odometry.T_odom_base
+        self._pending = compose(self._pending, step)
+        motion = odometry_motion(self._pending, self.config)
+        predicted = compose(self._T_grid_base, motion.step)
+        if not self._is_due_to_match(scan.stamp_s):
+            return self._report(predicted, motion, matched=False, integrated=False)
+        match = self._track(beams, predicted, motion, abs(float(step[2])))
+        before = self._T_grid_base
+        if not match.accepted:
+            return self._report(predicted, motion, matched=False, integrated=False)
+        self._T_grid_base = match.T_grid_base
+        self._quality, self._diversity = match.quality, match.diversity
+        self._pending = np.zeros(3)
+        motion = self._tracked_motion(before, match, motion)
+        integrated = self._is_due_to_integrate(scan.stamp_s)
+        if integrated:
+            self._T_grid_base = self._integrate(beams, match)
+            self._T_grid_integrated, self._integrated_s = self._T_grid_base, scan.stamp_s
+        return self._report(self._T_grid_base, motion, matched=True, integrated=integrated)
+
+    def view(self) -> GridView:
+        """Return the best particle's window."""
+        return self._window().view(self._stamp_s)
+
+    def occupied_points(self) -> NDArray[np.float32]:
+        """Return the occupied points of the best window, float32 (M, 2), metres, grid frame."""
+        return self._window().occupied_points()
+
+    def points_base(self) -> NDArray[np.float32]:
+        """Return the latest scan's hits, de-skewed, float32 (M, 2), metres, base frame."""
+        return self._beams.hits if self._beams is not None else np.empty((0, 2), dtype=np.float32)
+
+    # -- one scan
+    # --------------------------------------------------------------------------------------------------
+
+    def _begin(self, beams: Beams, odometry: Odometry) -> SlamUpdate:
+        self._T_odom_base = odometry.T_odom_base
+        self._T_grid_base = self._T_grid_integrated = odometry.T_odom_base
+        self._integrated_s = odometry.stamp_s
+        self._T_grid_base = self._integrate(beams, None)
+        motion = Motion(np.zeros(3), np.zeros((3, 3)))
+        return self._report(self._T_grid_base, motion, matched=False, integrated=True)
+
+    def _is_due_to_match(self, stamp_s: float) -> bool:
+        x, y, yaw = self._pending.tolist()
+        return (
+            math.hypot(x, y) >= self.config.match_distance_m
+            or abs(yaw) >= self.config.match_turn_rad
+            or abs(stamp_s - self._integrated_s) >= self.config.integrate_period_s
+        )
+
+    def _is_due_to_integrate(self, stamp_s: float) -> bool:
+        assert self._T_grid_base is not None  # noqa: S101
+        way = self._T_grid_base - self._T_grid_integrated
+        return (
+            math.hypot(way[0], way[1]) >= self.config.integrate_distance_m
+            or abs(float(wrap_angle(way[2]))) >= self.config.integrate_turn_rad
+            or abs(stamp_s - self._integrated_s) >= self.config.integrate_period_s
+        )
+
+    def _track(self, beams: Beams, predicted: Pose, motion: Motion, turn_rad: float) -> Match:
+        information = inverted(rotated(motion.covariance, float(predicted[2])))
+        reach_rad = 1.6 if turn_rad > self.config.large_turn_rad else 0.0
+        return self._match(beams, predicted, information, self._window(), reach_rad)
+
+    def _tracked_motion(self, before: Pose, match: Match, motion: Motion) -> Motion:
+        """Return the motion that odometry and match agree on."""
+        yaw = float(match.T_grid_base[2])
+        prior = inverted(rotated(motion.covariance, yaw))
+        self._covariance = inverted(match.information + prior)
+        return Motion(between(before, match.T_grid_base), rotated(self._covariance, -yaw))
+
+    def _report(self, T_grid_base: Pose, motion: Motion, *, matched: bool, integrated: bool) -> SlamUpdate:
+        T_grid_odom, jumped = self._correction.follow(T_grid_base, self._T_odom_base)
+        return SlamUpdate(
+            stamp_s=self._stamp_s,
+            T_grid_base=T_grid_base,
+            T_grid_odom=T_grid_odom,
+            covariance=self._covariance,
+            step_covariance=motion.covariance,
+            quality=self._quality,
+            diversity=self._diversity,
+            matched=matched,
+            integrated=integrated,
+            jumped=jumped,
+        )
+
+
+class WindowMatcher(Tracker):
+    """A single hypothesis: one window, one pose, no sampling. The leaner alternative that T7-1-3 asks for."""
+
+    def __init__(self, config: SlamConfig, seed: int = 0) -> None:
+        super().__init__(config, seed)
+        self._only = Window(config, self._tables, self._scratch)
+
+    def particles(self) -> NDArray[np.float64]:
+        """Return float64 (1, 3), the pose."""
+        return np.zeros((0, 3)) if self._T_grid_base is None else self._T_grid_base[None, :].copy()
+
+    def _window(self) -> Window:
+        return self._only
+
+    def _integrate(self, beams: Beams, match: Match | None) -> Pose:
+        del match
+        assert self._T_grid_base is not None  # noqa: S101
+        roll_and_integrate(self._only, beams, self._T_grid_base)
+        return self._T_grid_base
+
+
+def roll_and_integrate(window: Window, beams: Beams, T_grid_base: Pose) -> None:
+    """Shift only when the scan falls outside (thesis 3-4), then integrate."""
+    if not window.holds(beams, T_grid_base):
+        window.shift_to(window.centred_origin(T_grid_base))
+    window.integrate(beams, T_grid_base)
