@@ -18,6 +18,10 @@ from typing import Annotated, Any
 from pydantic import AllowInfNan, BaseModel, ConfigDict, Field, Strict, ValidationError, create_model
 
 from lemtomap.errors import BadSetting
+from lemtomap.grid.config import SlamConfig
+from lemtomap.nav.config import NavConfig
+from lemtomap.odometry import OdometryConfig
+from lemtomap.topo.config import TopoConfig
 from robot.ports import HOKUYO, KOBUKI, ListPorts, describe, matches_identity
 from robot.safety import SafetyLimits
 from robot.velocity import SmootherConfig
@@ -34,10 +38,24 @@ class PortsConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class LaserConfig:
+    """Where the laser sits on the base; these three may be negative."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class RobotConfig:
     """All a run can be told."""
 
     ports: PortsConfig = field(default_factory=PortsConfig)
+    laser: LaserConfig = field(default_factory=LaserConfig)
+    odometry: OdometryConfig = field(default_factory=OdometryConfig)
+    slam: SlamConfig = field(default_factory=SlamConfig)
+    topo: TopoConfig = field(default_factory=TopoConfig)
+    nav: NavConfig = field(default_factory=NavConfig)
     safety: SafetyLimits = field(default_factory=SafetyLimits)
     smoother: SmootherConfig = field(default_factory=SmootherConfig)
 

@@ -17,7 +17,7 @@ restrictive wins, and the reason names the rule that took something away:
     scan blind        (almost) no beam of the scan is valid         stop
     cliff             a cliff sensor sees no floor                  straight back, slowly, only
     bumper            a bumper is pressed                           no forward, slow back, slow turn
-    near obstacle     the raw scan has points on the way            slow down to stop before them
+    near obstacle     the raw scan has points on the way            slow down, stop before them, may turn away
     limit             faster than the limits                        clamp
 
 The gate knows no planner, driver or clock: a wrong map cannot talk it into driving.
@@ -75,8 +75,9 @@ class SafetyLimits:
     battery_hold_s: float = 5.0  # the voltage sags while the motors start
     scan_valid_beams: int = 10
     body_radius_m: float = 0.18  # Kobuki 0.178 with bumper
-    side_margin_m: float = 0.02
-    stop_gap_m: float = 0.04
+    side_margin_m: float = 0.01  # navigation keeps 0.015: the gate must not hold what navigation steers past
+    stop_gap_m: float = 0.025
+    creep_share: float = 0.05
     brake_mps2: float = 0.8  # gentle enough for a laptop on top
     reaction_s: float = 0.12  # one scan period and one output period
     own_parts_m: float = 0.15  # nearer points are the robot's own posts and cables
@@ -89,6 +90,9 @@ class Sides:
     left: bool = False
     centre: bool = False
     right: bool = False
+
+    def __or__(self, other: "Sides") -> "Sides":
+        return Sides(self.left or other.left, self.centre or other.centre, self.right or other.right)
 
     @property
     def any(self) -> bool:
@@ -210,7 +214,7 @@ class SafetyGate:
         return _lessened(allowed, v, w, Reason.BUMPER)
 
     def _approach(self, allowed: Allowed, evidence: Evidence, now_s: float) -> Allowed:
-        """Scale v and w together, so that the robot slows on its path and does not leave it."""
+        """Scale v and w together, so that the robot slows on its path; at a creep it may turn away."""
         lim = self.limits
         points = evidence.points_base
         points = points[np.hypot(points[:, 0], points[:, 1]) > lim.own_parts_m]
@@ -221,7 +225,10 @@ class SafetyGate:
         delay_s = lim.reaction_s + max(0.0, now_s - evidence.scan_stamp_s)
         safe_mps = _stoppable_mps(max(0.0, free_m), delay_s, lim.brake_mps2)
         share = min(1.0, safe_mps / abs(allowed.v_mps))
-        return _lessened(allowed, share * allowed.v_mps, share * allowed.w_radps, Reason.NEAR_OBSTACLE)
+        turn = (
+            share if share > lim.creep_share else 1.0
+        )  # a round body that (almost) stands turns without harm
+        return _lessened(allowed, share * allowed.v_mps, turn * allowed.w_radps, Reason.NEAR_OBSTACLE)
 
 
 def _fresh(stamp_s: float, now_s: float, age_max_s: float) -> bool:

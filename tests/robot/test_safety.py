@@ -151,7 +151,7 @@ def wall(x_m):
 
 def test_slows_before_a_wall_so_that_delay_and_braking_fit():
     for gap_m in (0.05, 0.1, 0.2, 0.29):
-        ev = evidence(points_base=wall(0.20 + 0.04 + gap_m))
+        ev = evidence(points_base=wall(0.19 + 0.025 + gap_m))
         allowed = verdict(0.6, 0.3, ev)
         assert allowed.reason is Reason.NEAR_OBSTACLE
         assert allowed.w_radps / allowed.v_mps == pytest.approx(0.5)
@@ -163,18 +163,22 @@ def test_an_older_scan_means_a_slower_approach():
     young, old = evidence(points_base=wall(0.4)), evidence(points_base=wall(0.4), scan_stamp_s=NOW - 0.3)
     early = evidence(points_base=wall(0.4), scan_stamp_s=NOW + 0.04)
     v = verdict(0.6, 0.0, old).v_mps
-    assert v * (LIM.reaction_s + 0.3) + v * v / (2 * LIM.brake_mps2) == pytest.approx(0.4 - 0.24)
+    assert v * (LIM.reaction_s + 0.3) + v * v / (2 * LIM.brake_mps2) == pytest.approx(0.4 - 0.215)
     assert verdict(0.6, 0.0, young).v_mps == verdict(0.6, 0.0, early).v_mps
 
 
 def test_stops_at_the_gap_and_does_not_reverse_for_it():
-    for x_m in (0.16, 0.19, 0.2399):
+    for x_m in (0.16, 0.19, 0.2149):
         assert verdict(0.3, 0.0, evidence(points_base=wall(x_m))) == Allowed(0.0, 0.0, Reason.NEAR_OBSTACLE)
 
 
 def test_turns_and_backs_away_from_a_wall_that_touches():
-    ev = evidence(points_base=wall(0.19))
+    ev = evidence(points_base=wall(0.18))
     assert verdict(0.0, 1.0, ev) == Allowed(0.0, 1.0, Reason.CLEAR)
+    assert verdict(0.3, 1.0, ev) == Allowed(0.0, 1.0, Reason.NEAR_OBSTACLE)
+    creeping = verdict(0.6, 0.5, evidence(points_base=wall(0.19 + 0.025 + 0.003)))
+    assert 0.0 < creeping.v_mps < 0.03
+    assert creeping.w_radps == 0.5
     assert verdict(-0.1, 0.0, ev) == Allowed(-0.1, 0.0, Reason.CLEAR)
 
 

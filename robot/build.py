@@ -1,0 +1,46 @@
+"""Putting a robot together from its settings."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from lemtomap.errors import BadSetting
+from lemtomap.grid.config import SlamConfig
+from lemtomap.grid.gmapping import RollingGmapping
+from lemtomap.grid.growing import GrowingGmapping
+from lemtomap.grid.mapper import WindowMatcher
+from lemtomap.nav.navigator import Navigator
+from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.reader import TopoReader
+from lemtomap.topo.store import TopoStore
+from robot.base import BaseStep
+from robot.config import RobotConfig
+from robot.core import RobotCore
+from robot.exchange import Exchange
+from robot.mapping import GridSlam, MappingStep
+from robot.navigating import NavigationStep
+
+SLAMS: dict[str, Callable[[SlamConfig, int], GridSlam]] = {
+    "rolling": RollingGmapping,
+    "window": WindowMatcher,
+    "gmapping": GrowingGmapping,
+}
+
+
+def build_slam(name: str, config: RobotConfig, seed: int) -> GridSlam:
+    """Return the grid SLAM of this name. Raises BadSetting."""
+    maker = SLAMS.get(name)
+    if maker is None:
+        raise BadSetting(f"slam '{name}': must be one of {', '.join(SLAMS)}")
+    return maker(config.slam, seed)
+
+
+def build_core(
+    config: RobotConfig, map_path: Path, *, slam: str = "rolling", seed: int = 0, durable: bool = True
+) -> RobotCore:
+    """Return a robot that maps into `map_path`, a new file or an existing map. Raises BadMap, BadSetting."""
+    exchange = Exchange()
+    make = TopoStore.open if map_path.exists() else TopoStore.create
+    mapper = TopoMapper(config.topo, make(map_path, durable=durable))
+    mapping = MappingStep(build_slam(slam, config, seed), mapper, exchange)
+    navigation = NavigationStep(Navigator(config.nav), exchange, lambda: TopoReader(map_path))
+    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)

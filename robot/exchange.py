@@ -1,0 +1,120 @@
+"""What the three parts of the robot hand to one another: immutable snapshots in mailboxes and bounded queues.
+
+base -> scans -> mapping -> map_view -> navigation -> nav_output -> base
+"""
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.nav.types import Contact, NavOutput, Sighting
+from lemtomap.topo.events import NavEvent
+from lemtomap.types import MapView, Odometry, Scan
+from robot.mailbox import BoundedQueue, Latest
+from robot.safety import Allowed, Reason
+from robot.velocity import Wish
+
+SCANS_WAITING = 4  # a mapper that is later than this gains nothing from older scans
+EVENTS_WAITING = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class TimedScan:
+    """One scan with the odometry that belongs to it."""
+
+    scan: Scan
+    odometry: Odometry
+    """At the stamp of the scan, that is of its first beam."""
+    sighting: Sighting
+    """The same scan, de-skewed by odometry, base frame at the stamp."""
+    arrival_s: float
+    valid_beams: int
+
+
+@dataclass(frozen=True, slots=True)
+class BaseStatus:
+    """How the base is, once per base step; for viewers, recorders and reports."""
+
+    stamp_s: float = -math.inf
+    odometry: Odometry | None = None
+    wish: Wish | None = None
+    sent: Allowed = field(default_factory=lambda: Allowed(0.0, 0.0, Reason.NOT_PERMITTED))
+    battery_v: float = math.nan
+    battery_percent: float = math.nan
+    bumped: bool = False
+    charging: bool = False
+
+
+class Level(StrEnum):
+    """How much a note matters."""
+
+    INFO = "INFO"
+    WARN = "WARN"
+    ERROR = "ERROR"
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """One line for the user and the log."""
+
+    stamp_s: float
+    source: str
+    text: str
+    level: Level = Level.INFO
+
+
+class MissionState(StrEnum):
+    """How far a mission is."""
+
+    WAITING = "waiting"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+
+    @property
+    def over(self) -> bool:
+        """Tell whether nothing more will come."""
+        return self in {MissionState.DONE, MissionState.FAILED}
+
+
+@dataclass(frozen=True, slots=True)
+class MissionStatus:
+    """What the mission does, in words."""
+
+    stamp_s: float
+    state: MissionState
+    text: str = ""
+
+
+class Exchange:
+    """The mailboxes, by the name of what lies in them."""
+
+    def __init__(self) -> None:
+        self.odometry: Latest[Odometry] = Latest()
+        self.scans: BoundedQueue[TimedScan] = BoundedQueue("scans for the mapper", SCANS_WAITING)
+        self.sightings: BoundedQueue[Sighting] = BoundedQueue("sightings for navigation", SCANS_WAITING)
+        self.contacts: BoundedQueue[Contact] = BoundedQueue("contacts for navigation", EVENTS_WAITING)
+        self.nav_events: BoundedQueue[NavEvent] = BoundedQueue("events for the mapper", EVENTS_WAITING)
+        self.map_view: Latest[MapView] = Latest()
+        self.nav_output: Latest[NavOutput] = Latest()
+        self.base_status: Latest[BaseStatus] = Latest()
+        self.mission: Latest[MissionStatus] = Latest()
+        self.notes: BoundedQueue[Note] = BoundedQueue("notes for the user", EVENTS_WAITING)
+        self.last_scan: Latest[TimedScan] = Latest()
+
+    def note(self, stamp_s: float, source: str, text: str, level: Level = Level.INFO) -> None:
+        """Leave a line for the user."""
+        self.notes.put(Note(stamp_s, source, text, level))
+
+    def dropped(self) -> dict[str, int]:
+        """Return what each queue has lost because its reader was too slow."""
+        queues = (self.scans, self.sightings, self.contacts, self.nav_events, self.notes)
+        return {queue.name: queue.dropped for queue in queues}
+
+
+def points_of(scan: TimedScan | None) -> NDArray[np.float64]:
+    """Return the hits of a scan, float64 (N, 2), metres, base frame at its stamp."""
+    return scan.sighting.hits_base if scan is not None else np.zeros((0, 2))

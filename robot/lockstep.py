@@ -1,0 +1,77 @@
+"""The robot and its simulated world, step by step on one virtual clock: fast, and the same every time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from drivers.kobuki.session import KobukiSession
+from robot.core import RobotCore, Samples
+from robot.exchange import MissionState
+from robot.feedback import Light, Signal
+from robot.missions import Mission
+from robot.wire import HOKUYO, KOBUKI, RecordedHokuyoSession, RecordedKobukiSession, Sink, Wire
+from sim.errors import Unplugged
+from sim.simulator import Simulator
+
+PERIOD_NS = 20_000_000  # one feedback packet of the base
+SETTLE_STEPS = 50  # steps after the end of a mission, for the last scans and a standing robot
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a run ended."""
+
+    now_s: float
+    state: MissionState
+    text: str
+
+
+def run_lockstep(
+    simulator: Simulator,
+    core: RobotCore,
+    mission: Mission,
+    duration_s: float,
+    record: Sink | None = None,
+    watch: Callable[[float], None] | None = None,
+) -> Ended:
+    """Run until the mission is over or the time is up; the last bytes to the base are a stop.
+
+    `watch` is called after each step with the virtual time. Same simulator seed, core, mission: same bytes.
+    """
+    keep = record if record is not None else _forget
+    base_session = RecordedKobukiSession(keep)
+    base = Wire(KOBUKI, simulator.kobuki, base_session, keep, Unplugged)
+    laser = Wire(HOKUYO, simulator.hokuyo, RecordedHokuyoSession(keep), keep, Unplugged)
+    core.navigation.set_mission(mission)
+    core.permit()
+    now_ns = round(simulator.now_s * 1e9)
+    end_ns, left = now_ns + round(duration_s * 1e9), SETTLE_STEPS
+    try:
+        while now_ns < end_ns and left > 0:
+            now_ns += PERIOD_NS
+            now_s = now_ns * 1e-9
+            simulator.advance(now_s)
+            commands = core.step(Samples(base.poll(now_s), laser.poll(now_s)), now_s)
+            base.write(base_session.drive(commands.drive.v_mps, commands.drive.w_radps), now_s)
+            for signal in commands.signals:
+                base.write(signal_bytes(base_session, signal), now_s)
+            if watch is not None:
+                watch(now_s)
+            status = core.exchange.mission.get()
+            left -= status is not None and status.state.over
+    finally:
+        core.halt()
+        base.write(base_session.stop_bytes(), now_ns * 1e-9)
+    status = core.exchange.mission.get()
+    state, text = (status.state, status.text) if status else (MissionState.WAITING, "no map yet")
+    return Ended(now_ns * 1e-9, state, text)
+
+
+def signal_bytes(session: KobukiSession, signal: Signal) -> bytes:
+    """Return the command that lights a LED or plays a tune."""
+    if isinstance(signal, Light):
+        return session.led(signal.number, signal.colour)
+    return session.sound(signal.tune)
+
+
+def _forget(_: object) -> None:
+    """Keep no record."""
