@@ -1,8 +1,58 @@
 """Commands about maps and recorded logs."""
 
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
 import typer
+
+from robot.cli_help import add
+
+
+class Slam(StrEnum):
+    """Which metric layer maps the log."""
+
+    ROLLING = "rolling"
+    GMAPPING = "gmapping"
+    WINDOW = "window"
 
 
 def register(app: typer.Typer) -> None:
-    """Add this module's commands to the program."""
-    del app
+    """Add this module's commands to the program, in the order of the help page."""
+    add(
+        app,
+        map_,
+        "lemtomap map intel.clf.xz --out out/intel",
+        "lemtomap map exp1.dat --out out/exp1 --particles 10 --seed 3",
+        "lemtomap map aces.clf --out out/aces --slam gmapping --particles 30    the baseline: no forgetting",
+        name="map",
+    )
+
+
+def map_(
+    log: Annotated[
+        Path, typer.Argument(metavar="LOG", help="CARMEN .clf/.log or tinySLAM .dat, also .gz/.xz")
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="folder for map, trajectory, picture and summary")],
+    *,
+    slam: Annotated[
+        Slam, typer.Option(help="rolling window, whole-grid GMapping, or single window matcher")
+    ] = Slam.ROLLING,
+    particles: Annotated[
+        int | None, typer.Option(metavar="N", min=1, max=1000, help="default 5, gmapping 30")
+    ] = None,
+    window: Annotated[float, typer.Option(metavar="M", help="width of the window, metres")] = 20.0,
+    max_range: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="usable range; at most half the window, which is also the default"),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="same log and seed: same map, byte for byte")] = 0,
+) -> None:
+    """Make a map of a recorded log."""
+    from robot.map_log import MapLogOptions, map_log
+    from robot.progress import progress_bar
+
+    options = MapLogOptions(log, out, slam.value, particles, window, max_range, seed)
+    with progress_bar(f"mapping {log.name}") as bar:
+        told = map_log(options, bar)
+    typer.echo(told)

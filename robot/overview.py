@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.se2 import Pose
-from lemtomap.types import EdgeType, GridView, Scan
+from lemtomap.types import EdgeType, GridView
 from robot.outputs import grey_levels
 
 EDGE_STYLE = {
@@ -33,32 +33,21 @@ class WallSketch:
 
     def __init__(self, capacity: int = 6000) -> None:
         self._capacity, self._stride, self._seen = capacity, 1, 0
-        self._kept: list[tuple[int, NDArray[np.float32]]] = []
+        self._kept: list[tuple[float, NDArray[np.float32]]] = []
 
-    def add(self, index: int, points_base: NDArray[np.floating]) -> None:
-        """Take the beam ends, (N, 2) metres, base frame, of the scan on the trajectory's line `index`."""
+    def add(self, key: float, points_base: NDArray[np.floating]) -> None:
+        """Take a scan's beam ends, (N, 2) metres, base frame; `key` tells which scan it was."""
         self._seen += 1
         if self._seen % self._stride:
             return
-        self._kept.append((index, points_base.astype(np.float32)))
+        self._kept.append((key, points_base.astype(np.float32)))
         if len(self._kept) >= self._capacity:
             self._kept, self._stride = self._kept[::2], self._stride * 2
 
-    def points(self, T_map_base: Pose) -> NDArray[np.float64]:
-        """Return all beam ends, float64 (N, 2), metres, by the final trajectory, float64 (scans, 3)."""
-        placed = [se2.transform(T_map_base[index], points) for index, points in self._kept]
+    def points(self, T_map_base: Mapping[float, Pose]) -> NDArray[np.float64]:
+        """Return all beam ends, float64 (N, 2), metres, by each scan's final pose (none: left out)."""
+        placed = [se2.transform(T_map_base[key], points) for key, points in self._kept if key in T_map_base]
         return np.concatenate(placed) if placed else np.zeros((0, 2))
-
-
-def scan_points(scan: Scan, range_limit_m: float) -> NDArray[np.float64]:
-    """Return the beam ends of returns within the limit, float64 (N, 2), metres, base frame."""
-    ranges = scan.ranges_m.astype(np.float64)
-    seen = (
-        np.isfinite(ranges) & (ranges >= scan.range_min_m) & (ranges < min(range_limit_m, scan.range_max_m))
-    )
-    angles = scan.angle_min_rad + scan.angle_step_rad * np.flatnonzero(seen)
-    points_laser = ranges[seen, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    return se2.transform(scan.T_base_laser, points_laser)
 
 
 @dataclass(frozen=True)

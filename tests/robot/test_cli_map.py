@@ -1,0 +1,97 @@
+"""`lemtomap map` on a small log: every file is there, says the same thing, and comes out the same twice."""
+
+import json
+import sqlite3
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from robot.cli import main
+
+WIDTH_M, DEPTH_M = 7.0, 5.0
+SCANS = 60
+
+
+def flaser(x, y, yaw, stamp_s):
+    """One CARMEN line: a SICK at (x, y, yaw) in an empty room with a pillar."""
+    bearings = yaw - np.pi / 2 + np.arange(181) * np.pi / 180
+    cos, sin = np.cos(bearings), np.sin(bearings)
+    with np.errstate(divide="ignore"):
+        walls = np.minimum(
+            np.where(cos > 0, (WIDTH_M - x) / cos, -x / cos), np.where(sin > 0, (DEPTH_M - y) / sin, -y / sin)
+        )
+    along = (4.5 - x) * cos + (3.5 - y) * sin
+    aside = np.abs((4.5 - x) * sin - (3.5 - y) * cos)
+    pillar = np.where((along > 0) & (aside < 0.3), along - np.sqrt(np.maximum(0.09 - aside**2, 0)), np.inf)
+    ranges = " ".join(f"{value:.3f}" for value in np.minimum(walls, pillar))
+    pose = f"{x:.6f} {y:.6f} {yaw:.6f}"
+    return f"FLASER 181 {ranges} {pose} {pose} {stamp_s:.6f} host {stamp_s:.6f}\n"
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "room.clf"
+    drive = [(1.0 + 0.06 * k, 1.0 + 0.6 * np.sin(k / 10), 0.4 * np.cos(k / 10)) for k in range(SCANS)]
+    path.write_text("".join(flaser(*pose, 976052857.25 + 0.2 * k) for k, pose in enumerate(drive)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def out(log, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("out") / "deep" / "room"
+    assert main(["map", str(log), "--out", str(folder), "--seed", "3"]) == 0
+    return folder
+
+
+def test_all_files_are_there_and_nothing_else(out):
+    names = sorted(path.name for path in out.iterdir())
+    expected = ["grid.pgm", "grid.yaml", "map.lemto", "overview.png", "summary.json", "trajectory.tum"]
+    assert names == expected
+    assert [path.name for path in out.parent.iterdir()] == [out.name]
+
+
+def test_the_trajectory_is_the_drive(out):
+    rows = np.loadtxt(out / "trajectory.tum")
+    assert rows.shape == (SCANS, 8)
+    assert rows[0, 0] == 976052857.25
+    truth = np.array([1.0 + 0.06 * (SCANS - 1), 1.0 + 0.6 * np.sin((SCANS - 1) / 10)]) - (1.0, 1.0)
+    turned = np.array([[np.cos(0.4), np.sin(0.4)], [-np.sin(0.4), np.cos(0.4)]]) @ truth
+    assert rows[-1, 1:3] - rows[0, 1:3] == pytest.approx(turned, abs=0.05)
+
+
+def test_summary_map_and_picture_agree(out):
+    told = json.loads((out / "summary.json").read_text())
+    with sqlite3.connect(out / "map.lemto") as map_file:
+        (nodes,) = map_file.execute("SELECT count(*) FROM node").fetchone()
+    map_file.close()
+    assert told["scans"] == SCANS
+    assert told["nodes"] == nodes
+    assert nodes >= 4
+    assert told["map_bytes"] == (out / "map.lemto").stat().st_size
+    assert told["seed"] == told["config"]["particles"] - 2 == 3
+    needed = {
+        "updates",
+        "cpu_s",
+        "wall_s",
+        "realtime_factor",
+        "peak_rss_mb",
+        "path_m",
+        "edges",
+        "loop_closures",
+    }
+    assert needed | {"config", "versions"} <= told.keys()
+    with Image.open(out / "overview.png") as picture:
+        assert picture.size == (1800, 1200)
+
+
+def test_same_log_and_seed_give_the_same_bytes(log, out, tmp_path):
+    assert main(["map", str(log), "--out", str(tmp_path / "again"), "--seed", "3"]) == 0
+    for name in ("trajectory.tum", "grid.pgm"):
+        assert (tmp_path / "again" / name).read_bytes() == (out / name).read_bytes()
+
+
+@pytest.mark.parametrize("slam", ["gmapping", "window"])
+def test_the_other_metric_layers_map_it_too(log, tmp_path, slam):
+    assert main(["map", str(log), "--out", str(tmp_path / slam), "--slam", slam, "--particles", "2"]) == 0
+    assert len((tmp_path / slam / "trajectory.tum").read_text().splitlines()) == SCANS
