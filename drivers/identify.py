@@ -1,6 +1,7 @@
 """Names a device by the bytes it sent, so that swapped ports and strangers are told in one line."""
 
 import re
+from dataclasses import dataclass
 from typing import Final
 
 KOBUKI: Final = "a Kobuki base"
@@ -11,6 +12,13 @@ _SCIP_ECHO: Final = re.compile(
 )
 _SCIP_BLOCK: Final = re.compile(rb"\n[0-o]{65}(?=\n)")
 _KOBUKI_FRAME: Final = re.compile(rb"\xaa\x55[\x11-\xff]\x01\x0f", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class WrongDeviceSeen:
+    """Another kind of device answers on this port."""
+
+    reason: str
 
 
 def name_device(data: bytes, enough: int = 400) -> str | None:

@@ -97,10 +97,3 @@ class LaserDown:
 
     stamp_s: float
     reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class WrongDeviceSeen:
-    """Another kind of device answers on this port."""
-
-    reason: str

@@ -173,10 +173,3 @@ class LinkDown:
 
     stamp_s: float
     reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class WrongDeviceSeen:
-    """Another kind of device answers on this port."""
-
-    reason: str

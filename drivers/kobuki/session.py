@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from drivers.clock import ClockConfig, DeviceClock
-from drivers.identify import KOBUKI, excerpt, name_device
+from drivers.identify import KOBUKI, WrongDeviceSeen, excerpt, name_device
 from drivers.kobuki.battery import BatteryConfig, BatteryModel
 from drivers.kobuki.codec import Decoder, encode
 from drivers.kobuki.commands import STOP, BaseControl, Led, Output, SetGains, Tune
@@ -16,7 +16,6 @@ from drivers.kobuki.events import (
     LinkDown,
     LinkUp,
     PowerEvent,
-    WrongDeviceSeen,
 )
 from drivers.kobuki.identity import GAINS_SINCE, AskConfig, Identity
 from drivers.kobuki.packets import BadFrame, Feedback, Gains
@@ -128,6 +127,7 @@ class KobukiSession:
             self._gate.restart()
         if not self._ever_alive and not self._probed and self._silent_s > config.probe_after_s:
             self._probed = True
+            self._queue.append(LinkDown(now_s, "nothing from the base: is it switched on?"))
             return b"\nQT\n"  # means nothing to a base that wakes up late; a laser answers, and can be named
         return self.identity.requests(now_s) if self.alive else b""
 
@@ -136,8 +136,12 @@ class KobukiSession:
         return encode(BaseControl.from_twist(v_mps, w_radps))
 
     def stop_bytes(self) -> bytes:
-        """Return the stop command: the last bytes a base should get."""
+        """Return the stop command."""
         return encode(STOP)
+
+    def close_bytes(self) -> bytes:
+        """Return the last bytes a base should get: a stop."""
+        return self.stop_bytes()
 
     def sound(self, tune: Tune) -> bytes:
         """Return the command that plays a tune of the firmware."""
