@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers import identify
 from drivers.hokuyo.packets import SensorParameters
 
 
@@ -97,3 +98,8 @@ class LaserDown:
 
     stamp_s: float
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class WrongDeviceSeen(identify.WrongDeviceSeen):
+    """Not a laser answers on this port."""

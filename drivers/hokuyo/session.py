@@ -16,6 +16,7 @@ from drivers.hokuyo.events import (
     LaserUp,
     LaserWell,
     SensorInfo,
+    WrongDeviceSeen,
 )
 from drivers.hokuyo.packets import (
     CHECKED_NORMAL,
@@ -30,7 +31,7 @@ from drivers.hokuyo.packets import (
 )
 from drivers.hokuyo.scans import ScanMaker, View
 from drivers.hokuyo.steps import Step
-from drivers.identify import HOKUYO, WrongDeviceSeen, excerpt, name_device
+from drivers.identify import HOKUYO, excerpt, name_device
 
 HokuyoEvent: TypeAlias = (
     LaserScan | SensorInfo | LaserFault | LaserWell | LaserUp | LaserDown | WrongDeviceSeen | BadReply

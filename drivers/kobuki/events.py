@@ -11,6 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers import identify
 from drivers.kobuki.battery import Battery, PowerChange
 from drivers.kobuki.packets import (
     Bumper,
@@ -173,3 +174,8 @@ class LinkDown:
 
     stamp_s: float
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class WrongDeviceSeen(identify.WrongDeviceSeen):
+    """Not a Kobuki answers on this port."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from drivers.clock import ClockConfig, DeviceClock
-from drivers.identify import KOBUKI, WrongDeviceSeen, excerpt, name_device
+from drivers.identify import KOBUKI, excerpt, name_device
 from drivers.kobuki.battery import BatteryConfig, BatteryModel
 from drivers.kobuki.codec import Decoder, encode
 from drivers.kobuki.commands import STOP, BaseControl, Led, Output, SetGains, Tune
@@ -16,6 +16,7 @@ from drivers.kobuki.events import (
     LinkDown,
     LinkUp,
     PowerEvent,
+    WrongDeviceSeen,
 )
 from drivers.kobuki.identity import GAINS_SINCE, AskConfig, Identity
 from drivers.kobuki.packets import BadFrame, Feedback, Gains
