@@ -34,9 +34,9 @@ class CostmapConfig:
     falloff_m: float = 0.12  # e-folding of that extra cost
     unknown_factor: float = 4.0  # unseen floor is driven only where nothing seen leads there
     live_hits: int = 2  # scans that must agree before a live obstacle counts: single ghosts do not
-    live_decay_s: float = 3.0  # a live obstacle not seen again is believed this long
+    live_decay_s: float = 8.0  # a live obstacle out of sight is believed this long
     live_range_m: float = 4.0  # beyond, the window alone is good enough
-    contact_radius_m: float = 0.06  # a bump says where within about a cell
+    contact_radius_m: float = 0.18  # of what was bumped into only one side is known; a chair's foot is wider
     contact_memory_s: float = 1800.0  # what the laser overlooks cannot be seen to go away
 
 
@@ -69,7 +69,7 @@ class RecoveryConfig:
     """When it does not work: each rung of the ladder is bounded in time and distance."""
 
     progress_m: float = 0.20  # nearer to the goal by this much ...
-    progress_s: float = 8.0  # ... within this time, or something is wrong
+    progress_s: float = 6.0  # ... within this time, or something is wrong
     polite_wait_s: float = 6.0  # what moves is given this long to make way
     closed_after_s: float = 2.5  # what stands still for this long is closed
     turn_s: float = 7.0
@@ -79,7 +79,8 @@ class RecoveryConfig:
     back_off_mps: float = 0.10
     block_s: float = 60.0  # a closed edge is tried again after this
     lost_patience_s: float = 20.0
-    attempts: int = 3  # times through the ladder without progress before giving up
+    attempts: int = 2  # times through the ladder before giving up ...
+    forgive_m: float = 3.0  # ... unless this much way was made good in between
 
 
 @dataclass(frozen=True, slots=True)

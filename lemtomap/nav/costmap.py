@@ -114,6 +114,15 @@ class Costmap:
         marks = ends[: len(sighting.hits_base)][near[: len(sighting.hits_base)]]
         kernels.mark_hits(layer.last_hit_s, layer.hits, marks[:, 0], marks[:, 1], sighting.stamp_s)
 
+    def hold(self, p_grid: ArrayLike, radius_m: float, until_s: float) -> None:
+        """Let live obstacles within a radius be believed until then, unless rays clear them before."""
+        row, col = self._cells(np.asarray(p_grid, dtype=np.float64)[None, :2])[0]
+        for layer in self._live.values():
+            rows, cols = np.nonzero(layer.hits)
+            away = np.hypot(rows + 0.5 - row, cols + 0.5 - col) * self._resolution_m
+            close = away <= radius_m
+            layer.last_hit_s[rows[close], cols[close]] = until_s - self._config.live_decay_s
+
     def forget_live(self) -> None:
         """Drop all live obstacles: the next scans tell anew."""
         self._live.clear()
@@ -143,6 +152,10 @@ class Costmap:
         if costs.holds(p_robot_grid) and np.isinf(cost[int(row), int(col)]):
             kernels.open_start(cost, clearance, row, col, 0.30 / res, TIGHT_COST)
         return costs
+
+    @property
+    def _resolution_m(self) -> float:
+        return 1.0 if self._grid is None else self._grid.resolution_m
 
     def _cells(self, p_grid: Points) -> NDArray[np.float64]:
         """Return [row, col] real numbers (N, 2)."""

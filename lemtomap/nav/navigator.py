@@ -22,7 +22,7 @@ from lemtomap.nav.motion.dwa import approach
 from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
 from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.route.planner import Route, plan_route
-from lemtomap.nav.sliding import BORDER_M, Target, choose_target, find_barrier, place_of
+from lemtomap.nav.sliding import BORDER_M, Target, choose_target, find_barrier, find_detour, place_of
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
     Contact,
@@ -123,7 +123,8 @@ class Navigator:
         """
         self._cycle += 1
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
-        moment = _Moment(map_view, graph, T_odom_base, T_grid_base, self._speed(twist), now_s)
+        speed = REST if bumps else self._speed(twist)  # a bump has stopped the robot, or must
+        moment = _Moment(map_view, graph, T_odom_base, T_grid_base, speed, now_s)
         self._way_back.drove(T_odom_base)
         self.surroundings.take(map_view, _as_sightings(scan_points_base, T_odom_base, now_s))
         self._feel(bumps, moment)
@@ -198,7 +199,7 @@ class Navigator:
         self.costs = costs = self.surroundings.costs(view, moment.T_grid_base, moment.now_s)
         self._costmap_view = costs.view()
         reach = reach_from(costs, moment.T_grid_base)
-        self._barriers.remember(costs)
+        self._barriers.remember(self.surroundings.hits_grid(view.T_grid_odom), moment.now_s)
         tolerance = goal.tolerance_m or self.config.goal_tolerance_m
         self._target = choose_target(route, goal, view.T_grid_node, reach, tolerance)
         self._plan = None
@@ -214,19 +215,23 @@ class Navigator:
 
     def _check_barrier(self, route: Route, reach: Reach, moment: _Moment) -> None:
         """Close the edges a standing barrier cuts, once it is to be believed."""
-        goal = self._goal
+        goal, places = self._goal, moment.map_view.T_grid_node
+        if goal is None:
+            return
         beyond = 0 if self._target is None else self._target.index
-        barrier = None
-        if goal is not None and not (self._target is not None and self._target.final):
-            barrier = find_barrier(route, goal, moment.map_view.T_grid_node, reach, beyond)
+        barrier = find_barrier(route, goal, places, reach, beyond)
+        if barrier is None and self._plan is not None:
+            way_m = np.inf if self._barriers.watching else self._plan.length_m
+            barrier = find_detour(route, goal, places, reach.costs, beyond, way_m)
         if barrier is None:
             self._barriers.reset()
             return
         away_m = float(np.hypot(*(np.array(barrier.p_near_grid) - moment.T_grid_base[:2])))
         near = away_m < NEAR_BARRIER_M or self._target is None
-        if self._barriers.closed(barrier, reach.costs, near=near):
+        if self._barriers.closed(barrier, moment.now_s, near=near):
             on_route = _link(route, barrier.index)
             self._close([on_route, *links_cut(moment.map_view, reach, BORDER_M)], moment)
+            self.surroundings.hold(barrier.p_middle_grid, moment.now_s + self.config.recovery.block_s)
 
     def _close(self, links: Sequence[Link], moment: _Moment) -> None:
         """Plan around these edges from now on, and tell the map."""
@@ -253,8 +258,7 @@ class Navigator:
         remaining_m = plan.length_m + sum(edge.length_m for edge in route.edges[target.index :])
         if self._progress.stuck(remaining_m, moment.now_s):
             return self._climb(moment)
-        if self._progress.advanced(moment.now_s) and not self._ladder.running:
-            self._ladder.reset()
+        self._ladder.relax(self._progress.gained_m)
         return self._send(route, plan, target, step, moment)
 
     def _send(self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: _Moment) -> NavOutput:
@@ -308,7 +312,7 @@ class Navigator:
         if self._ladder.exhausted:
             return self._fail(moment, Reason.BLOCKED, "no progress after every recovery")
         rung = self._ladder.climb(moment.T_odom_base, moment.now_s)
-        self._progress.restart(moment.now_s)
+        self._progress.grace(moment.now_s)
         self._planned_s = -np.inf
         if rung == Rung.CLEAR:
             self.surroundings.forget_live()
@@ -326,8 +330,7 @@ class Navigator:
         if wanted is None:
             return None
         name = self._ladder.name
-        if not self._ladder.running:
-            self._progress.restart(moment.now_s)
+        self._progress.grace(moment.now_s)
         twist = approach(moment.twist, wanted, self.config.body, self.config.period_s)
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
         twist = limit_twist(twist, points, self.config.body)

@@ -30,22 +30,28 @@ class ProgressWatch:
         self._config = config
         self._best_m = np.inf
         self._since_s = -np.inf
+        self.gained_m = 0.0
+        """Way made good since the restart."""
 
     def restart(self, now_s: float) -> None:
-        """Begin anew: new goal, new route, or the way was made longer on purpose."""
+        """Begin anew: a new goal or a new route."""
         self._best_m = np.inf
+        self.gained_m = 0.0
+        self.grace(now_s)
+
+    def grace(self, now_s: float) -> None:
+        """Give what is being tried its time; what had been reached before still stands."""
         self._since_s = now_s
 
     def stuck(self, remaining_m: float, now_s: float) -> bool:
         """Take the way still to go; True when it has not shrunk for longer than allowed."""
-        if remaining_m < self._best_m - self._config.progress_m:
+        if np.isinf(self._best_m):
+            self._best_m = remaining_m
+        elif remaining_m < self._best_m - self._config.progress_m:
+            self.gained_m += self._best_m - remaining_m
             self._best_m = remaining_m
             self._since_s = now_s
         return now_s - self._since_s > self._config.progress_s
-
-    def advanced(self, now_s: float) -> bool:
-        """Tell whether there was progress in the last second."""
-        return bool(np.isfinite(self._best_m)) and now_s - self._since_s < 1.0
 
 
 class WayBack:
@@ -106,8 +112,15 @@ class Ladder:
         return self._rounds >= self._config.attempts
 
     def reset(self) -> None:
-        """Start from the foot: there was progress, or there is a new goal."""
+        """Start from the foot for a new goal."""
         self._next, self._rounds, self._running = Rung.REPLAN, 0, None
+
+    def relax(self, gained_m: float) -> None:
+        """Start from the foot after progress; only much of it lets past failures be forgotten."""
+        if self._running is None and gained_m > 0.0:
+            self._next = Rung.REPLAN
+            if gained_m >= self._config.forgive_m:
+                self._rounds = 0
 
     def climb(self, T_odom_base: Pose, now_s: float) -> Rung:
         """Take the next rung; turning and backing off then run through `step`."""

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from lemtomap import se2
+from lemtomap.nav import kernels
+from lemtomap.nav.costmap import Costs
 from lemtomap.nav.metric import Reach
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.types import Goal
@@ -15,6 +17,9 @@ from lemtomap.se2 import Pose
 
 BORDER_M = 0.4
 """A node this near to the window's border has its surroundings cut off."""
+DETOUR_SHARE = 1.3
+DETOUR_M = 1.5
+"""A way this much longer than the edges it follows leads round something."""
 SNAP_M = 0.30
 """A node's pose in the window may be off by this much; its place is looked for this near."""
 
@@ -42,6 +47,12 @@ class Barrier:
     edge_id: int
     p_near_grid: tuple[float, float]
     p_far_grid: tuple[float, float]
+
+    @property
+    def p_middle_grid(self) -> tuple[float, float]:
+        """Half-way between its ends."""
+        (x0, y0), (x1, y1) = self.p_near_grid, self.p_far_grid
+        return 0.5 * (x0 + x1), 0.5 * (y0 + y1)
 
 
 def place_of(route: Route, index: int, goal: Goal, T_grid_node: Mapping[int, Pose]) -> Pose | None:
@@ -83,13 +94,34 @@ def find_barrier(
         if near is None or far is None or not reach.costs.holds(far, BORDER_M):
             return None
         if reach.nearest(far, SNAP_M) is None:
-            return Barrier(
-                index,
-                route.edges[index].edge_id,
-                (float(near[0]), float(near[1])),
-                (float(far[0]), float(far[1])),
-            )
+            return _barrier(route, index, near, far)
     return None
+
+
+def find_detour(
+    route: Route, goal: Goal, T_grid_node: Mapping[int, Pose], costs: Costs, upto: int, way_m: float
+) -> Barrier | None:
+    """Return the first edge before route index `upto` that something cuts, if that makes the way a detour.
+
+    way_m: the way to the place at `upto` through the window. A chair in the corridor makes no detour; a shut
+    door does, even where the window shows another way round.
+    """
+    route_m = sum(edge.length_m for edge in route.edges[:upto])
+    if way_m < DETOUR_SHARE * route_m + DETOUR_M:
+        return None
+    for index in range(upto):
+        near = place_of(route, index, goal, T_grid_node)
+        far = place_of(route, index + 1, goal, T_grid_node)
+        if near is None or far is None or not (costs.holds(near) and costs.holds(far)):
+            continue
+        if kernels.worst_on_line(costs.cost, costs.state, *costs.cell(near), *costs.cell(far)) == 2:
+            return _barrier(route, index, near, far)
+    return None
+
+
+def _barrier(route: Route, index: int, near: Pose, far: Pose) -> Barrier:
+    ends = [(float(place[0]), float(place[1])) for place in (near, far)]
+    return Barrier(index, route.edges[index].edge_id, *ends)
 
 
 def _target_at(

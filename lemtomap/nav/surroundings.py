@@ -16,6 +16,8 @@ from lemtomap.types import MapView
 
 FRESH_S = 0.6
 """Range points older than this say nothing about what is in front of the body now."""
+HOLD_M = 0.9
+SAME_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +63,18 @@ class Surroundings:
         T_grid_node = map_view.T_grid_node.get(map_view.associated_id)
         if T_grid_node is not None:
             for x, y in se2.transform(se2.between(T_grid_node, T_grid_base), p_base):
-                self._hazards.append(Hazard(map_view.associated_id, (float(x), float(y)), contact.stamp_s))
+                self._keep(Hazard(map_view.associated_id, (float(x), float(y)), contact.stamp_s))
         x, y = p_base[len(p_base) // 2]
         return Bumped(contact.kind.value, float(x), float(y), contact.stamp_s)
+
+    def _keep(self, hazard: Hazard) -> None:
+        """Add a hazard, or renew the one it repeats."""
+        self._hazards = [
+            old
+            for old in self._hazards
+            if old.node_id != hazard.node_id or np.hypot(*np.subtract(old.p_node, hazard.p_node)) > SAME_M
+        ]
+        self._hazards.append(hazard)
 
     def costs(self, map_view: MapView, T_grid_base: Pose, now_s: float) -> Costs:
         """Return the costmap of this moment."""
@@ -81,6 +92,18 @@ class Surroundings:
         """Return the raw range points near the body, present base frame, float64 (N, 2)."""
         fresh = [s for s in self._sightings.values() if now_s - s.stamp_s < FRESH_S]
         return points_now(fresh, T_odom_base)
+
+    def hits_grid(self, T_grid_odom: Pose) -> Points:
+        """Return what each sensor hit last, float64 (N, 2), metres, grid frame."""
+        parts = [
+            se2.transform(se2.compose(T_grid_odom, sighting.T_odom_base), sighting.hits_base)
+            for sighting in self._sightings.values()
+        ]
+        return np.concatenate([np.empty((0, 2)), *parts])
+
+    def hold(self, p_grid: tuple[float, float], until_s: float) -> None:
+        """Believe the live obstacles around a closed place until then, or until they are seen to be gone."""
+        self._costmap.hold(p_grid, HOLD_M, until_s)
 
     def forget_live(self) -> None:
         """Drop live obstacles; walls and hazards stay."""

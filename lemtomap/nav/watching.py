@@ -1,21 +1,25 @@
 """Watching edges: how long each takes to drive, and whether a barrier across one is a door or a person."""
 
+from collections import deque
 from collections.abc import Container
 
 import numpy as np
 
 from lemtomap.nav import kernels
 from lemtomap.nav.config import RecoveryConfig
-from lemtomap.nav.costmap import Costs
 from lemtomap.nav.metric import Reach
 from lemtomap.nav.sliding import SNAP_M, Barrier
+from lemtomap.nav.types import Points
 from lemtomap.topo.events import EdgeTraversed
 from lemtomap.types import MapView, RouteGraph
 
 AROUND_M = 0.9
 """What moves this near to the far side's line of a barrier belongs to it."""
 MEMORY_S = 0.8
-"""Something that was elsewhere this long ago moves."""
+"""Something that was elsewhere this long ago moves ..."""
+MOVED_M = 0.10
+"""... if it was elsewhere by this much: more than the noise of a URG-04LX."""
+MOVED_HITS = 4
 
 
 class EdgeClock:
@@ -51,27 +55,31 @@ class BarrierWatch:
         self._edge_id: int | None = None
         self._first_s = 0.0
         self._still_s = 0.0
-        self._older: Costs | None = None
-        self._newer: Costs | None = None
+        self._past: deque[tuple[float, Points]] = deque()
+
+    @property
+    def watching(self) -> bool:
+        """True while a barrier is under suspicion."""
+        return self._edge_id is not None
 
     def reset(self) -> None:
         """The route is open."""
         self._edge_id = None
 
-    def remember(self, costs: Costs) -> None:
-        """Keep a costmap from about MEMORY_S ago to compare with."""
-        if self._newer is None or costs.stamp_s - self._newer.stamp_s >= MEMORY_S:
-            self._older, self._newer = self._newer, costs
+    def remember(self, hits_grid: Points, now_s: float) -> None:
+        """Keep what the sensors hit over the last second, to compare with; float64 (N, 2), metres."""
+        self._past.append((now_s, hits_grid))
+        while now_s - self._past[0][0] > MEMORY_S:
+            self._past.popleft()
 
-    def closed(self, barrier: Barrier, costs: Costs, *, near: bool) -> bool:
+    def closed(self, barrier: Barrier, now_s: float, *, near: bool) -> bool:
         """Take the barrier seen now; True once it is to be treated as closed.
 
         near: the robot stands before it; only then does waiting for something that moves run out.
         """
-        now_s = costs.stamp_s
         if barrier.edge_id != self._edge_id:
             self._edge_id, self._first_s, self._still_s = barrier.edge_id, now_s, now_s
-        if self.moving(barrier, costs):
+        if self.moving(barrier):
             self._still_s = now_s
         if not near:
             self._first_s = now_s
@@ -79,20 +87,21 @@ class BarrierWatch:
             return True
         return near and now_s - self._first_s >= self._config.polite_wait_s
 
-    def moving(self, barrier: Barrier, costs: Costs) -> bool:
-        """Tell whether obstacles around the barrier stand where none stood a moment ago."""
-        old = self._older
-        if old is None or old.state.shape != costs.state.shape:
+    def moving(self, barrier: Barrier) -> bool:
+        """Tell whether around the barrier something is hit where nothing was hit a moment ago."""
+        if len(self._past) < 2:
             return False
-        row, col = costs.cell(np.add(barrier.p_near_grid, barrier.p_far_grid) / 2.0)
-        radius = AROUND_M / costs.resolution_m
-        rows, cols = np.nonzero(costs.state == kernels.LETHAL)
-        close = np.hypot(rows + 0.5 - row, cols + 0.5 - col) <= radius
-        shift_col, shift_row = (np.array(costs.origin_m) - np.array(old.origin_m)) / costs.resolution_m
-        r, c = rows[close] + round(shift_row), cols[close] + round(shift_col)
-        inside = (r >= 0) & (c >= 0) & (r < old.state.shape[0]) & (c < old.state.shape[1])
-        fresh = old.clearance[r[inside], c[inside]] > 3.0
-        return int(fresh.sum()) >= 3
+        (_, old), (_, new) = self._past[0], self._past[-1]
+        new, old = _around(new, barrier, AROUND_M), _around(old, barrier, AROUND_M + 0.5)
+        if len(new) < MOVED_HITS or not len(old):
+            return False
+        away_m = np.sqrt(((new[:, None, :] - old[None, :, :]) ** 2).sum(axis=-1).min(axis=1))
+        return int((away_m > MOVED_M).sum()) >= MOVED_HITS
+
+
+def _around(points_grid: Points, barrier: Barrier, radius_m: float) -> Points:
+    away_m = np.hypot(*(points_grid - np.array(barrier.p_middle_grid)).T)
+    return np.asarray(points_grid[away_m <= radius_m])
 
 
 Link = tuple[int, int, int]

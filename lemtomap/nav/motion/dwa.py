@@ -16,6 +16,8 @@ TIGHTEST_M = 0.10
 
 
 CREEP_MPS = 0.06
+NEAR_M = 1.3
+"""This near to where it stops, the robot looks at the spot itself and no longer at the way ahead."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ def choose_twist(
     if not costs.holds(T_grid_base):
         return Choice(None, 0)
     v_cap_mps = body.v_max_mps if ending is None else ending.v_cap_mps(body.braking_mps2)
-    forward_m = dwa.forward_m if ending is None else min(dwa.forward_m, 0.5 * ending.to_go_m)
+    forward_m = 0.0 if ending is not None and ending.to_go_m < NEAR_M else dwa.forward_m
     vs, ws = velocity_window(twist, v_cap_mps, body, dwa)
     here_m = float(costs.clearance[int(row), int(col)]) * costs.resolution_m
     body_m = min(body.radius_m + costmap.margin_m, max(TIGHTEST_M, here_m - 0.1 * costs.resolution_m))
@@ -63,7 +65,7 @@ def choose_twist(
         body.acceleration_mps2, body.braking_mps2, body.turn_acceleration_radps2,
         dwa.horizon_s, dwa.step_s, forward_m, body_m,
         dwa.clearance_weight, dwa.clearance_falloff_m, dwa.turn_weight, dwa.change_weight,
-        int(ending is not None and ending.to_go_m < 1.5), scores,
+        int(ending is not None and ending.to_go_m < NEAR_M), scores,
     )  # fmt: skip
     if best < 0:
         return Choice(None, scores.size)

@@ -106,6 +106,8 @@ def score_trajectories(
                 continue
             to_go = min(least, here + 2.0 * forward_m / resolution if np.isinf(ahead) else ahead) * resolution
             score = to_go + turn_weight * abs(ws[j]) + change_weight * abs(ws[j] - w_now)
+            if ending == 1:
+                score -= 0.3 * vs[i]  # all that pass the target are as good: do not dawdle
             if nearest < 1e8:
                 score += clearance_weight * np.exp(-(nearest - body_m) / clearance_falloff_m)
             scores[i, j] = score

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lemtomap import se2
-from lemtomap.nav.types import Sighting
+from lemtomap.nav.types import Contact, ContactKind, Sighting
 from lemtomap.types import EdgeType, GridView, MapView, RouteEdge, Scan, Twist
 
 RES = 0.05
@@ -157,6 +157,16 @@ class World:
             self.pose = moved
         self.twist = twist
         self.now_s += dt
+
+    def bump(self) -> Contact:
+        """What Kobuki's three bumper switches tell of a touch in front."""
+        bearings = np.linspace(-1.5, 1.5, 61)
+        x = self.pose[0] + 0.22 * np.cos(self.pose[2] + bearings)
+        y = self.pose[1] + 0.22 * np.sin(self.pose[2] + bearings)
+        r, c = np.floor(y / RES).astype(int), np.floor(x / RES).astype(int)
+        hit = self.solid(x, y) | self.hidden[r, c]
+        bearing = float(bearings[hit].mean()) if hit.any() else 0.0
+        return Contact(self.now_s, ContactKind.BUMPER, float(np.clip(np.rint(bearing), -1, 1)))
 
     def touching(self, pose) -> bool:
         ring = np.linspace(0, 2 * np.pi, 48)

@@ -1,0 +1,148 @@
+"""What the navigator does when the world changes or does not let it pass."""
+
+import numpy as np
+import pytest
+
+from lemtomap.nav.navigator import Navigator
+from lemtomap.nav.types import NavState, Reason
+from lemtomap.topo.events import Bumped, EdgeBlocked
+from tests.lemtomap.nav.test_navigator import two_rooms
+from tests.lemtomap.nav.world import run
+
+
+def shut(world, x0: float, x1: float) -> None:
+    world.box(x0, 2.0, x1, 2.15)
+
+
+def test_takes_another_way_within_5_s_when_a_door_is_closed():
+    world = two_rooms()
+    world.pose[:2] = (4.0, 1.0)
+    shut_s = world.now_s + 1.0
+
+    def door(w):
+        if w.now_s >= shut_s:
+            shut(w, 6.55, 7.45)
+
+    outputs = run(world, Navigator(), 8, 90.0, door)
+    rerouted = next(o for o in outputs if o.stamp_s > shut_s and 13 in o.route)
+    assert rerouted.stamp_s - shut_s < 5.0
+    assert any(isinstance(e, EdgeBlocked) for o in outputs for e in o.events)
+    assert outputs[-1].state == NavState.ARRIVED
+    assert world.contacts == 0
+
+
+def test_uses_a_door_again_that_opens():
+    world = two_rooms()
+    world.pose[:2] = (4.0, 1.0)
+    shut(world, 6.55, 7.45)
+    navigator = Navigator()
+    assert run(world, navigator, 8, 90.0)[-1].state == NavState.ARRIVED
+    world.box(6.55, 2.0, 7.45, 2.15, value=False)
+    outputs = run(world, navigator, 6, 60.0)
+    assert outputs[-1].state == NavState.ARRIVED
+    assert len(outputs) * 0.1 < 15.0, "took the long way though the door stood open in plain sight"
+
+
+def test_refuses_with_the_reason_when_no_way_is_left():
+    world = two_rooms()
+    shut(world, 6.55, 7.45)
+    shut(world, 1.75, 2.65)
+    navigator = Navigator()
+    outputs = run(world, navigator, 9, 60.0)
+    assert outputs[-1].state == NavState.FAILED
+    assert outputs[-1].reason in {Reason.NO_ROUTE, Reason.BLOCKED}
+    assert "closed" in outputs[-1].text
+    assert world.contacts == 0
+    assert run(world, navigator, 3, 30.0)[-1].state == NavState.ARRIVED
+
+
+def test_waits_politely_for_somebody_in_the_doorway():
+    world = two_rooms()
+    world.pose[:2] = (5.0, 1.0)
+    begin_s = world.now_s
+
+    def person(w):
+        t = w.now_s - begin_s
+        w.extra = [(7.0 + 0.15 * np.sin(3.0 * t), 2.1, 0.25)] if t < 8.0 else []
+
+    outputs = run(world, Navigator(), 8, 60.0, person)
+    assert outputs[-1].state == NavState.ARRIVED
+    assert not any(13 in o.route for o in outputs)
+    assert len(outputs) * 0.1 < 22.0
+    assert world.contacts == 0
+
+
+def test_somebody_who_stays_is_gone_around():
+    world = two_rooms()
+    world.pose[:2] = (5.0, 1.0)
+
+    def person(w):
+        w.extra = [(7.0, 2.1, 0.25)]
+
+    outputs = run(world, Navigator(), 8, 90.0, person)
+    assert outputs[-1].state == NavState.ARRIVED
+    assert any(13 in o.route for o in outputs)
+    assert world.contacts == 0
+
+
+def drive_blind(world, navigator, goal, seconds):
+    """Like `run`, with a bumper that reports what only touch can find."""
+    navigator.set_goal(goal, world.now_s)
+    outputs, touched = [], world.contacts
+    for _ in range(int(seconds / 0.1)):
+        bumps = [world.bump()] if world.contacts > touched else []
+        touched = world.contacts
+        outputs.append(
+            navigator.step(
+                world.view(),
+                world.graph,
+                world.T_odom_base,
+                world.twist,
+                world.sighting(),
+                bumps,
+                world.now_s,
+            )
+        )
+        if navigator.goal is None:
+            break
+        world.drive(outputs[-1].twist)
+    return outputs
+
+
+def test_never_bumps_twice_into_what_the_laser_overlooks():
+    world = two_rooms()
+    world.hidden[18:23, 70:75] = True  # 0.25 m wide, in the middle of the corridor at x = 3.6
+    navigator = Navigator()
+    outputs = drive_blind(world, navigator, 6, 90.0)
+    assert outputs[-1].state == NavState.ARRIVED
+    assert sum(isinstance(e, Bumped) for o in outputs for e in o.events) == world.contacts == 1
+    assert drive_blind(world, navigator, 1, 90.0)[-1].state == NavState.ARRIVED
+    assert world.contacts == 1
+
+
+def test_gives_up_in_bounded_time_when_the_wheels_spin():
+    world = two_rooms()
+    navigator = Navigator()
+    navigator.set_goal(6, world.now_s)
+    output = None
+    while navigator.goal is not None and world.now_s < 500.0:
+        output = navigator.step(
+            world.view(), world.graph, world.T_odom_base, world.twist, world.sighting(), (), world.now_s
+        )
+        world.now_s += 0.1
+    assert output is not None
+    assert output.state == NavState.FAILED
+    assert output.reason in {Reason.BLOCKED, Reason.NO_ROUTE}
+    assert world.now_s < 100.0 + 180.0
+
+
+def test_waits_for_a_lost_pose_and_then_says_so():
+    world = two_rooms()
+    navigator = Navigator()
+    run(world, navigator, 6, 3.0)
+    world.lost = True
+    outputs = run(world, navigator, 6, 60.0)
+    assert outputs[10].state == NavState.WAITING
+    assert outputs[10].twist.v_mps == pytest.approx(0.0)
+    assert outputs[-1].state == NavState.FAILED
+    assert outputs[-1].reason == Reason.LOST
