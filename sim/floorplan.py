@@ -25,6 +25,8 @@ class _Wall:
     thickness_m: float
     height_m: float
     surface: Surface
+    base_m: float = 0.0
+    """Height of the floor it stands on."""
     gaps: list[tuple[float, float]] = field(default_factory=list)
     """Openings as (from, to) along the wall, metres from its start."""
 
@@ -66,7 +68,7 @@ class _Wall:
             half = ((high - low) / 2 + grow, self.thickness_m / 2, self.height_m / 2)
             shift = self.thickness_m / 4 * ((high >= self.length_m) - (low <= 0.0))
             ux, uy = self.direction()
-            centre = (x + ux * shift, y + uy * shift, self.height_m / 2)
+            centre = (x + ux * shift, y + uy * shift, self.base_m + self.height_m / 2)
             boxes.append(Box(centre, half, yaw, surface=self.surface))
         return boxes
 
@@ -74,8 +76,12 @@ class _Wall:
 class FloorPlan:
     """A building being drawn."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, wall_height_m: float = WALL_HEIGHT_M) -> None:
         self.name = name
+        self.level = 0
+        """Storey being drawn."""
+        self.level_height_m = 0.0
+        self._wall_height_m = wall_height_m
         self.flat = True
         self.dock: Pose2 | None = None
         self._walls: list[_Wall] = []
@@ -90,13 +96,26 @@ class FloorPlan:
         end: Point,
         *,
         thickness_m: float = WALL_THICKNESS_M,
-        height_m: float = WALL_HEIGHT_M,
+        height_m: float | None = None,
         surface: Surface = Surface.WALL,
     ) -> None:
         """Draw a straight wall."""
         if math.dist(start, end) < 0.01:
             raise BadWorld(f"{self.name}: wall at {start} has no length")
-        self._walls.append(_Wall(start, end, thickness_m, height_m, surface))
+        height = self._wall_height_m if height_m is None else height_m
+        self._walls.append(_Wall(start, end, thickness_m, height, surface, self._base_m))
+
+    @property
+    def _base_m(self) -> float:
+        return self.level * self.level_height_m
+
+    def outline(self, margin_m: float) -> tuple[float, float, float, float]:
+        """Return x0, y0, x1, y1 around all walls. Raises BadWorld when there are none."""
+        points = [point for wall in self._walls for point in (wall.start, wall.end)]
+        if not points:
+            raise BadWorld(f"{self.name}: no walls")
+        xs, ys = [x for x, _ in points], [y for _, y in points]
+        return min(xs) - margin_m, min(ys) - margin_m, max(xs) + margin_m, max(ys) + margin_m
 
     def rectangle(self, low: Point, high: Point) -> None:
         """Draw four walls."""
@@ -115,6 +134,8 @@ class FloorPlan:
     ) -> Door:
         """Cut a doorway into the wall through `at`. Raises BadWorld when no wall is there."""
         for wall in self._walls:
+            if wall.base_m != self._base_m:
+                continue
             along, off = wall.locate(at)
             if off <= wall.thickness_m and width_m / 2 <= along <= wall.length_m - width_m / 2:
                 low, high = along - width_m / 2, along + width_m / 2
@@ -124,10 +145,14 @@ class FloorPlan:
                 return door
         raise BadWorld(f"{self.name}: door '{name}' at ({at[0]:g}, {at[1]:g}) lies in no wall")
 
-    def room(self, name: str, low: Point, high: Point, *, kind: str = "room", level: int = 0) -> None:
+    def opening(self, name: str, start: Point, end: Point, rooms: tuple[str, str]) -> None:
+        """Note a passage without a wall, as wide as the room."""
+        self._doors.append(Door(name, (start, end), rooms))
+
+    def room(self, name: str, low: Point, high: Point, *, kind: str = "room") -> None:
         """Name a rectangle as ground truth."""
         (x0, y0), (x1, y1) = low, high
-        self._rooms.append(Room(name, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), kind, level))
+        self._rooms.append(Room(name, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), kind, self.level))
 
     def box(self, box: Box) -> None:
         """Put a box anywhere."""
@@ -137,7 +162,7 @@ class FloorPlan:
         """Add something that moves."""
         self._movers.append(mover)
 
-    def build(self, spawn: Pose2 | None = None, description: str = "") -> World:
+    def build(self, spawn: Pose2 | None = None, description: str = "", name: str | None = None) -> World:
         """Raise the walls. Raises BadWorld when the spawn pose stands in something."""
         boxes = tuple(box for wall in self._walls for box in wall.boxes()) + tuple(self._boxes)
         inside = spawn[:2] if spawn is not None else self._middle()
@@ -154,7 +179,16 @@ class FloorPlan:
                 )
         truth = GroundTruth(tuple(self._rooms), tuple(self._doors))
         return World(
-            self.name, boxes, raster, spawn, truth, tuple(self._movers), self.dock, self.flat, description
+            name=name or self.name,
+            boxes=boxes,
+            raster=raster,
+            spawn=spawn,
+            truth=truth,
+            movers=tuple(self._movers),
+            dock=self.dock,
+            flat=self.flat,
+            level_height_m=self.level_height_m,
+            description=description,
         )
 
     def _middle(self) -> Point:

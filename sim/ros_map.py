@@ -13,6 +13,7 @@ from sim.raster import SPAWN_CLEARANCE_M, boxes_from_raster, clearance_m, connec
 from sim.world import Pose2, Raster, World
 
 WALL_HEIGHT_M = 1.0
+GAP_M = 2.5  # between copies and round them
 MAX_SIDE_PX = 20_000  # 1 km at 0.05 m
 KNOWN_SPAWNS: dict[str, Pose2] = {
     "willowgarage_perfect": (6.0, -16.0, 0.0)
@@ -91,3 +92,29 @@ def _spawn(raster: Raster, path: Path) -> Pose2:
         if 0 <= row < rows and 0 <= col < cols and clearance_m(raster)[row, col] >= SPAWN_CLEARANCE_M:
             return known
     return find_spawn(raster, str(path))
+
+
+def side_by_side(world: World, copies: int) -> World:
+    """Return so many copies of a map in a row, GAP_M apart, a wall round them all: they look all the same."""
+    raster = world.raster
+    step = raster.resolution_m
+    rows, cols = np.nonzero(raster.occupied)
+    gap = round(GAP_M / step)
+    building = np.pad(raster.occupied[rows.min() : rows.max() + 1, cols.min() : cols.max() + 1], gap)
+    pitch = building.shape[1] - gap
+    occupied = np.zeros((building.shape[0], pitch * copies + gap), dtype=np.bool_)
+    for index in range(copies):
+        occupied[:, index * pitch : index * pitch + building.shape[1]] |= building
+    occupied[:2] = occupied[-2:] = True
+    occupied[:, :2] = occupied[:, -2:] = True
+    x0 = raster.origin_m[0] + (int(cols.min()) - gap) * step
+    y0 = raster.origin_m[1] + (int(rows.min()) - gap) * step
+    joined = Raster(occupied, ~occupied, step, (x0, y0))
+    joined = Raster(occupied, connected(joined, world.spawn[:2]), step, (x0, y0))
+    return World(
+        name=f"{world.name}@{copies}",
+        boxes=boxes_from_raster(joined, WALL_HEIGHT_M),
+        raster=joined,
+        spawn=world.spawn,
+        description=f"{copies} x {world.description}",
+    )

@@ -122,7 +122,7 @@ class Simulator:
             contact_count=body.contact_count,
             contact_s=body.contact_s,
             touching=bool(body.contacts),
-            room=self.world.truth.room_at(x, y),
+            room=self.world.truth.room_at(x, y, self.world.level_at(body.state.height_m)),
         )
 
     def _tick(self) -> None:

@@ -102,9 +102,9 @@ class GroundTruth:
             graph.setdefault(b, set()).add(a)
         return graph
 
-    def room_at(self, x: float, y: float) -> str | None:
-        """Return the name of the room around a point."""
-        return next((room.name for room in self.rooms if room.contains(x, y)), None)
+    def room_at(self, x: float, y: float, level: int = 0) -> str | None:
+        """Return the name of the room around a point of one storey."""
+        return next((room.name for room in self.rooms if room.level == level and room.contains(x, y)), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,4 +143,10 @@ class World:
     """Where a charging dock stands and which way it faces."""
     flat: bool = True
     """False: there are ramps or holes, and wheels and cliff sensors must feel the floor."""
+    level_height_m: float = 0.0
+    """Height of one storey; 0 when there is only one."""
     description: str = ""
+
+    def level_at(self, height_m: float) -> int:
+        """Return the storey of a robot at a height."""
+        return round(height_m / self.level_height_m) if self.level_height_m else 0

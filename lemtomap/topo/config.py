@@ -1,8 +1,9 @@
 """Settings of the topological map, each with its unit and source."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from lemtomap.errors import BadSetting
+from lemtomap.topo.align import MatchConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,9 +20,14 @@ class TopoConfig:
     )
     robot_radius_m: float = 0.18  # Kobuki's body, 351.5 mm across
     occupied_from: int = 50  # occupancy of GridView that stops the robot
-    max_step_deviation_m: float = 0.5  # a larger jump of the SLAM pose between two scans is no motion
     place_radius_m: float = 5.0  # half the window less the distance at which data is taken
     place_taken_at_m: float = 3.5  # with the radius: still whole in a 20 m window, surroundings all seen
+    place_byte_budget: int = 240  # at most; some 150 on average, so that 300 hold with the descriptor
+    place_alike_score: float = 0.8  # a visit that sees this share of a place finds it unchanged
+    place_stale_visits: int = 3  # so many visits in a row that do not, and it is taken anew
+    match: MatchConfig = field(default_factory=MatchConfig)
+    align_again_m: float = 0.3  # a refused match is tried again after this way
+    implicit_sigma_m: float = 0.3  # a near neighbour predicted this well may be matched at once
     commit_every_s: float = 0.5  # design section 7: at most a second is lost
     paged_nodes: int = 4096  # nodes kept in memory, a few hundred bytes each
     durable: bool = True  # sync to disk with each commit; batch runs over a log need not

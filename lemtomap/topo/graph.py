@@ -29,6 +29,8 @@ class Node:
     created_s: float = 0.0
     visits: int = 1
     """How often the robot associated with this node; long-term operation prunes and ages by it."""
+    doubts: int = 0
+    """Visits in a row at which the place did not look like its localisation data."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,8 @@ class Standing:
     """float64 (3, 3), relative to the window, axes of the node."""
     anchored: bool
     """Measured in this window, rather than predicted by the graph."""
+    born: bool = False
+    """Made in this window: no match stands behind its pose."""
 
 
 class LocalMap:
@@ -42,9 +44,15 @@ class LocalMap:
         self.standings: dict[int, Standing] = {}
         self.reached: dict[int, Reached] = {}
 
-    def anchor(self, node_id: int, T_grid_node: Pose, covariance: Covariance) -> None:
+    def anchor(self, node_id: int, T_grid_node: Pose, covariance: Covariance, *, born: bool = False) -> None:
         """Set a node's pose as measured in this window."""
-        self.standings[node_id] = Standing(T_grid_node, covariance, anchored=True)
+        self.standings[node_id] = Standing(T_grid_node, covariance, anchored=True, born=born)
+
+    def release_matched(self) -> None:
+        """Let go of all nodes whose poses rest on matches and closures (one of them proved wrong)."""
+        for node_id, standing in self.standings.items():
+            if not standing.born:
+                self.standings[node_id] = replace(standing, anchored=False)
 
     def release_forgotten(self, grid: GridView) -> None:
         """Let go of nodes whose surroundings the window has forgotten."""

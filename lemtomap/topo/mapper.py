@@ -1,15 +1,18 @@
 """Topological SLAM, one scan at a time (thesis, Figure 3-6): associate, or be born and join."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.errors import LemtomapError
-from lemtomap.se2 import Pose, adjoint, between
+from lemtomap.se2 import Pose, adjoint, between, compose
 from lemtomap.topo.config import TopoConfig
-from lemtomap.topo.graph import Covariance, Edge, chain_covariance
+from lemtomap.topo.events import NavEvent
+from lemtomap.topo.graph import Covariance, Edge, Place, chain_covariance
+from lemtomap.topo.keeper import PlaceKeeper, Taken
+from lemtomap.topo.learning import learn
 from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.neighbours import NeighbourFinder, in_sight
 from lemtomap.topo.paging import PagedGraph
@@ -25,6 +28,39 @@ class NotStarted(LemtomapError):
     """A snapshot was asked for before the first scan."""
 
 
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """How the local grid map transform of the associated node is known (thesis, section 3-3-2)."""
+
+    measured: bool
+    """False: the graph's prediction stands in."""
+    covariance: Covariance
+    """float64 (3, 3), axes of the node."""
+    score: float = 1.0
+    reason: str = ""
+    """Why it is not measured."""
+
+
+class Recogniser(Protocol):
+    """Explicit loop closing, as the mapper sees it."""
+
+    def describe(self, points_node: NDArray[np.float64]) -> bytes:
+        """Return the rotation-invariant descriptor of boundary points, float64 (N, 2), node frame."""
+        ...
+
+    def place_taken(self, node_id: int, place: Place) -> None:
+        """Take note of a node's localisation data, new or renewed."""
+        ...
+
+    def at_node(self, mapper: "TopoMapper", *, born: bool) -> None:
+        """A node was made or became the associated one."""
+        ...
+
+    def update(self, mapper: "TopoMapper") -> None:
+        """Work a slice after each scan; may call close_loop, revoke, start_component or relocate."""
+        ...
+
+
 @dataclass(slots=True)
 class _Now:
     """What the last scan said."""
@@ -37,24 +73,34 @@ class TopoMapper:
     """The topological map as it grows. Owned by the mapping thread; hands out immutable views.
 
     Holds: exactly one node is associated from the first scan on, and the next one is a new node or one of
-    its neighbours.
+    its neighbours (or the one a closure proves).
     """
 
     def __init__(
-        self, config: TopoConfig, store: TopoStore, trail: ScanTrail | None = None, *, level: int = 0
+        self,
+        config: TopoConfig,
+        store: TopoStore,
+        trail: ScanTrail | None = None,
+        *,
+        level: int = 0,
+        recogniser: Recogniser | None = None,
     ) -> None:
         self.config = config
         self.store = store
         self.graph = PagedGraph(store, config.paged_nodes)
         self.local = LocalMap(self.graph, config.local_radius_m, config.local_limit)
+        self.keeper = PlaceKeeper(config, self.graph, recogniser.describe if recogniser else None)
         self.trail = ScanTrail.temporary() if trail is None else trail
         self.level = level
         self.lost = False
-        self.on_node: list[Callable[[int], None]] = []
-        """Called with the ID of each new node."""
+        self.travelled_m = 0.0
+        """Way of the base since the start, metres."""
+        self._recogniser = recogniser
         self._neighbours = NeighbourFinder(config)
         self._associated_id = 0
         self._drift: Covariance = np.zeros((3, 3))
+        self._transform = Transform(measured=True, covariance=np.zeros((3, 3)))
+        self._tried_m = 0.0
         self._now: _Now | None = None
         self._picture: tuple[tuple[int, int], list[tuple[int, int, int, EdgeType]]] = ((-1, -1), [])
 
@@ -66,41 +112,50 @@ class TopoMapper:
     @property
     def T_node_base(self) -> Pose:  # noqa: N802 - a frame's name
         """Where the robot is relative to the associated node."""
+        return between(self._pose_of(self._associated_id), self._require().slam.T_grid_base)
+
+    @property
+    def transform(self) -> Transform:
+        """How the associated node's pose in the window is known."""
+        return self._transform
+
+    @property
+    def now(self) -> tuple[SlamUpdate, GridView]:
+        """What the last scan said, and the window."""
         now = self._require()
-        return between(self.local.standings[self._associated_id].T_grid_node, now.slam.T_grid_base)
+        return now.slam, now.grid
 
     def update(
-        self,
-        slam: SlamUpdate,
-        grid: GridView,
-        points_base: NDArray[np.floating] | None = None,  # noqa: ARG002
+        self, slam: SlamUpdate, grid: GridView, points_base: NDArray[np.floating] | None = None
     ) -> None:
         """Take in what one scan told the window SLAM.
 
         `grid` is the window after this scan (an older snapshot will do between integrations);
-        `points_base` are the scan's hits, float (N, 2), metres, base frame.
+        `points_base` are the scan's hits, float (N, 2), metres, base frame. Without them the window's cells
+        must do for localisation data.
         """
         before, self._now = self._now, _Now(slam, grid)
+        self.keeper.observe(slam.T_grid_base, points_base)
         if before is None:
-            self._start()
+            self._birth()
         else:
             self._move(before.slam, slam)
             if grid is not before.grid:
                 self.local.release_forgotten(grid)
             self._associate_or_create()
+        if self._recogniser is not None:
+            self._recogniser.update(self)
         self.trail.append(slam.stamp_s, self._associated_id, self.T_node_base)
         self.store.tick(slam.stamp_s)
 
     # -- the steps of Figure 3-6 ----------------------------------------------------------------------------
-
-    def _start(self) -> None:
-        self._birth()
 
     def _move(self, before: SlamUpdate, after: SlamUpdate) -> None:
         """Let the covariance of T_node_base grow by the motion since the previous scan."""
         step = between(before.T_grid_base, after.T_grid_base)
         turn = _turned(-step[2])
         self._drift = chain_covariance(self._drift, step, turn @ after.step_covariance @ turn.T)
+        self.travelled_m += float(np.hypot(step[0], step[1]))
 
     def _associate_or_create(self) -> None:
         """Only a neighbour or a new node can come next, and only one that no wall hides.
@@ -115,6 +170,8 @@ class TopoMapper:
             self._associate(nearest_id)
         elif associated_m > far or (associated_m > 0.5 * far and not self._sees(self._associated_id)):
             self._create()
+        elif not self._transform.measured and self.travelled_m - self._tried_m > self.config.align_again_m:
+            self._align_associated()
 
     def _nearest_neighbour(self, within_m: float) -> int:
         """Return the nearest neighbour of the associated node in sight; 0 when none is so near."""
@@ -140,52 +197,153 @@ class TopoMapper:
         return self.local.standings[node_id].T_grid_node
 
     def _associate(self, node_id: int) -> None:
-        """Make an existing neighbour the associated node."""
-        now = self._require()
+        """Make an existing node the associated node; find where it stands if the window does not know."""
         self._associated_id = node_id
-        standing = self.local.standings[node_id]
-        T_node_base = between(standing.T_grid_node, now.slam.T_grid_base)
-        self._drift = _through_window(standing, T_node_base, now.slam)
-        self.local.settle(node_id)
+        node = self.graph.node(node_id)
+        self.graph.put_node(replace(node, visits=node.visits + 1))
+        self._align_associated()
+        self._take_places()
+        if self._recogniser is not None:
+            self._recogniser.at_node(self, born=False)
 
     def _create(self) -> None:
         """Make a node here, with its odometry edge and all near-neighbour edges that help."""
         previous_id, T_previous_new, covariance = self._associated_id, self.T_node_base, self._drift
         node_id = self._birth()
-        self._join(previous_id, node_id, T_previous_new, covariance + COVARIANCE_FLOOR, EdgeType.ODOMETRY)
+        covariance = covariance + COVARIANCE_FLOOR
+        self.graph.add_edge(Edge(0, previous_id, node_id, T_previous_new, covariance, EdgeType.ODOMETRY))
         self.local.settle(node_id)
+        self._anchor_beside(node_id)
         grid = self._require().grid
         for edge in self._neighbours.edges_for(node_id, self.graph, self.local, grid):
             self.graph.add_edge(edge)
-        for listener in self.on_node:
-            listener(node_id)
+        self._take_places()
+        if self._recogniser is not None:
+            self._recogniser.at_node(self, born=True)
 
     def _birth(self) -> int:
         now = self._require()
         area_id = self.graph.node(self._associated_id).area_id if self._associated_id else 1
         node = self.graph.add_node(area_id=area_id, level=self.level, created_s=now.slam.stamp_s)
-        turn = _turned(-now.slam.T_grid_base[2])
-        covariance = turn @ now.slam.covariance @ turn.T
-        self.local.anchor(node.node_id, np.array(now.slam.T_grid_base, dtype=np.float64), covariance)
+        T_grid_node = np.array(now.slam.T_grid_base, dtype=np.float64)
+        covariance = _relative_to_window(now.slam)
+        self.local.anchor(node.node_id, T_grid_node, covariance, born=True)
+        self.keeper.due(node.node_id)
         self._associated_id = node.node_id
         self._drift = np.zeros((3, 3))
+        self._transform = Transform(measured=True, covariance=covariance)
         return node.node_id
 
-    def _join(self, a: int, b: int, T_a_b: Pose, covariance: Covariance, kind: EdgeType) -> Edge:
-        return self.graph.add_edge(Edge(0, a, b, T_a_b, covariance, kind))
+    # -- the local grid map transform -----------------------------------------------------------------------
 
-    def _require(self) -> _Now:
-        if self._now is None:
-            raise NotStarted("the mapper has seen no scan yet")
-        return self._now
+    def _align_associated(self) -> None:
+        """Measure where the associated node stands, unless the window has known it all along."""
+        node_id = self._associated_id
+        standing = self.local.standings[node_id]
+        self._tried_m = self.travelled_m
+        if standing.anchored:
+            self._transform = Transform(measured=True, covariance=standing.covariance)
+        else:
+            self._transform = self._measured(node_id)
+        standing = self.local.standings[node_id]
+        T_node_base = between(standing.T_grid_node, self._require().slam.T_grid_base)
+        slam = self._require().slam
+        self._drift = chain_covariance(standing.covariance, T_node_base, _relative_to_window(slam))
+        self.local.settle(node_id)
 
-    # -- what others see ------------------------------------------------------------------------------------
+    def _measured(self, node_id: int) -> Transform:
+        """Match one node's localisation data with the window and anchor it there when it fits."""
+        standing = self.local.standings[node_id]
+        match = self.keeper.align(node_id, standing, self._require().grid)
+        if match is None:
+            return Transform(measured=False, covariance=standing.covariance, score=0.0, reason="no data")
+        if match.refused:
+            return Transform(False, standing.covariance, match.score, match.refused)
+        self.local.anchor(node_id, match.T_grid_node, match.covariance)
+        self.keeper.compare(node_id, match)
+        return Transform(measured=True, covariance=match.covariance, score=match.score)
+
+    def _anchor_beside(self, node_id: int) -> None:
+        """Match the nearest well-predicted node that the window does not hold, so that edges may join it."""
+        limit_m, sigma_m = self.config.near_neighbour_max_m, self.config.implicit_sigma_m
+        beside = [
+            (self._distance_m(other_id), other_id)
+            for other_id, standing in self.local.standings.items()
+            if not standing.anchored
+            and float(np.linalg.eigvalsh(standing.covariance[:2, :2])[-1]) <= sigma_m**2
+        ]
+        if beside and min(beside)[0] <= limit_m and self._measured(min(beside)[1]).measured:
+            self.local.settle(node_id)
+
+    def _take_places(self) -> None:
+        now = self._require()
+        taken = self.keeper.take_ripe(
+            self.local.standings, self._associated_id, now.slam.T_grid_base, now.grid, now.slam.stamp_s
+        )
+        self._tell(taken)
+
+    def _tell(self, taken: list[Taken]) -> None:
+        if self._recogniser is not None:
+            for each in taken:
+                self._recogniser.place_taken(each.node_id, each.place)
+
+    # -- closures and components ----------------------------------------------------------------------------
+
+    def standing(self, node_id: int) -> Standing | None:
+        """Return where a node of the neighbourhood stands in the window, None beyond it."""
+        return self.local.standings.get(node_id)
+
+    def close_loop(
+        self, source_id: int, target_id: int, T_source_target: Pose, covariance: Covariance
+    ) -> Edge:
+        """Commit a closure between two nodes, of one component or two; returns the edge, for revoke.
+
+        When the source stands in this window, the target now does too.
+        """
+        edge = Edge(0, source_id, target_id, np.array(T_source_target), covariance, EdgeType.LOOP_CLOSING)
+        edge = self.graph.add_edge(edge)
+        source = self.local.standings.get(source_id)
+        if source is not None and source.anchored:
+            T_grid_target = compose(source.T_grid_node, T_source_target)
+            joined = chain_covariance(source.covariance, edge.T_source_target, covariance)
+            self.local.anchor(target_id, T_grid_target, joined)
+        self.local.settle(self._associated_id)
+        return edge
+
+    def revoke(self, edge_id: int) -> None:
+        """Take back a closure. What its acceptance made the window believe is measured again."""
+        edge = self.store.edge(edge_id)
+        if edge is None:
+            return
+        self.graph.delete_edge(edge)
+        self.local.release_matched()
+        self.local.settle(self._associated_id)
+
+    def start_component(self) -> int:
+        """Start a new part of the graph here, joined to nothing yet (carried elsewhere); returns its node."""
+        self.local.standings.clear()
+        node_id = self._birth()
+        self.local.settle(node_id)
+        return node_id
+
+    def relocate(self, node_id: int, T_grid_node: Pose, covariance: Covariance) -> None:
+        """Make a known node the associated one because it was recognised in the window."""
+        self.local.anchor(node_id, np.array(T_grid_node), covariance)
+        self._associated_id = node_id
+        self._align_associated()
+
+    # -- what others say and see ----------------------------------------------------------------------------
+
+    def apply(self, event: NavEvent) -> None:
+        """Learn what navigation found out. Before the first scan there is nothing to learn it for."""
+        if self._now is not None:
+            learn(event, self.graph, self._associated_id, self.T_node_base)
 
     def view(self, particles: NDArray[np.float64] | None = None) -> MapView:
         """Return an immutable snapshot of the neighbourhood. Raises NotStarted before the first scan."""
         now = self._require()
-        names = self.store.names() if self._associated_id else {}
         poses = {node_id: standing.T_grid_node for node_id, standing in self.local.standings.items()}
+        names = {node_id: name for name, node_id in self.store.names().items() if node_id in poses}
         return MapView(
             stamp_s=now.slam.stamp_s,
             grid=now.grid,
@@ -198,7 +356,7 @@ class TopoMapper:
             diversity=now.slam.diversity,
             lost=self.lost,
             particles=particles,
-            names={node_id: name for name, node_id in names.items() if node_id in poses},
+            names=names,
         )
 
     def _edges_in_view(self) -> list[tuple[int, int, int, EdgeType]]:
@@ -217,16 +375,22 @@ class TopoMapper:
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""
         if self._now is not None:
+            self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
             self.store.set_meta("associated_id", self._associated_id)
             self.store.set_meta("T_node_base", " ".join(repr(float(v)) for v in self.T_node_base))
         self.store.close()
+
+    def _require(self) -> _Now:
+        if self._now is None:
+            raise NotStarted("the mapper has seen no scan yet")
+        return self._now
 
 
 def _turned(yaw_rad: float) -> Covariance:
     return adjoint(np.array([0.0, 0.0, yaw_rad]))
 
 
-def _through_window(standing: Standing, T_node_base: Pose, slam: SlamUpdate) -> Covariance:
-    """Return the covariance of T_node_base when both stand in the same window, axes of base."""
-    turn = _turned(-slam.T_grid_base[2])
-    return chain_covariance(standing.covariance, T_node_base, turn @ slam.covariance @ turn.T)
+def _relative_to_window(slam: SlamUpdate) -> Covariance:
+    """Return the covariance of T_grid_base relative to the window, axes of base."""
+    turn = _turned(-float(slam.T_grid_base[2]))
+    return np.asarray(turn @ slam.covariance @ turn.T) + COVARIANCE_FLOOR

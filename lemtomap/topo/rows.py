@@ -9,7 +9,7 @@ import numpy as np
 from lemtomap.topo.graph import Covariance, Edge, Node, OpeningState, Placeholder
 from lemtomap.types import EdgeType
 
-NODE_COLUMNS = "id, area, level, created, visits"
+NODE_COLUMNS = "id, area, level, created, visits, doubts"
 EDGE_COLUMNS = "id, source, target, type, share, time, blocked, measure"
 
 _MEASURE = struct.Struct("<3d6f")  # relative pose in full; covariance's upper triangle needs no more
@@ -21,7 +21,7 @@ _SHARE_STEPS = 255
 
 def node_row(node: Node) -> tuple[Any, ...]:
     """Return the node's values in the order of NODE_COLUMNS."""
-    return (node.node_id, node.area_id, node.level, node.created_s, node.visits)
+    return (node.node_id, node.area_id, node.level, node.created_s, node.visits, node.doubts)
 
 
 def node_from(row: Sequence[Any]) -> Node:

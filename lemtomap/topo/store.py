@@ -153,7 +153,7 @@ class TopoStore:
         """Make a node with an ID never used before in this file."""
         node = Node(self._next_node, area_id, level, created_s)
         self._next_node += 1
-        self._write(f"INSERT INTO node({NODE_COLUMNS}) VALUES(?, ?, ?, ?, ?)", node_row(node))
+        self._write(f"INSERT INTO node({NODE_COLUMNS}) VALUES(?, ?, ?, ?, ?, ?)", node_row(node))
         return node
 
     def node(self, node_id: int) -> Node | None:
@@ -169,8 +169,8 @@ class TopoStore:
     def put_node(self, node: Node) -> None:
         """Write a changed node."""
         self._write(
-            "UPDATE node SET area = ?, level = ?, created = ?, visits = ? WHERE id = ?",
-            (node.area_id, node.level, node.created_s, node.visits, node.node_id),
+            "UPDATE node SET area = ?, level = ?, created = ?, visits = ?, doubts = ? WHERE id = ?",
+            (node.area_id, node.level, node.created_s, node.visits, node.doubts, node.node_id),
         )
 
     def delete_node(self, node_id: int) -> None:

@@ -1,0 +1,326 @@
+"""Worlds described in TOML; an unknown key, an overlapping spawn or a door in no wall is one clear line.
+
+name = "flat"
+spawn = [1.0, 1.0, 0.0]
+dock = [0.3, 2.0, 0.0]
+[[wall]]
+points = [[0, 0], [8, 0], [8, 5], [0, 5], [0, 0]]
+surface = "glass"                      # wall (default), glass, dark
+[[room]]
+name = "kitchen"
+low = [0, 0]
+high = [4, 5]
+[[door]]
+at = [4.0, 2.5]
+rooms = ["kitchen", "hall"]
+leaf = "swings"                        # none (default), swings, closed
+[[furniture]]
+kind = "table"                         # cabinet, table, chair, sofa, crate
+at = [2.0, 1.0, 0.3]
+moved = [[1, 2.4, 1.1, 0.3]]           # day, x, y, yaw
+[[person]]
+points = [[1, 4], [7, 4]]
+[[barrier]]
+from = [4.0, 2.0]
+to = [4.0, 3.0]
+during = [60.0, 120.0]                 # a closed corridor in mid-mission
+[[ramp]]
+from = [1.0, 4.0]
+to = [4.0, 4.0]
+rise = 0.3
+width = 1.2
+[[hole]]
+low = [6, 1]
+high = [7, 2]
+"""
+
+import math
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from sim import furniture
+from sim.errors import BadWorld
+from sim.floorplan import FloorPlan
+from sim.movers import Appearing, Person, SwingDoor
+from sim.world import Box, Pose2, Surface, World
+
+Area = tuple[float, float, float, float]
+FLOOR_SLAB_M = 0.2
+MARGIN_M = 1.0
+FURNITURE: dict[str, Callable[[float, float, float], list[Box]]] = {
+    "cabinet": furniture.cabinet,
+    "table": furniture.table,
+    "chair": furniture.office_chair,
+    "sofa": furniture.sofa,
+    "crate": lambda x, y, _yaw: furniture.bin_low(x, y),
+}
+KEYS: dict[str, tuple[frozenset[str], frozenset[str]]] = {
+    "": (frozenset({"name"}), frozenset({"spawn", "dock", "description"})),
+    "wall": (frozenset({"points"}), frozenset({"surface", "thickness", "height"})),
+    "room": (frozenset({"name", "low", "high"}), frozenset({"kind"})),
+    "door": (frozenset({"at", "rooms"}), frozenset({"name", "width", "leaf", "period"})),
+    "furniture": (frozenset({"kind", "at"}), frozenset({"moved"})),
+    "person": (frozenset({"points"}), frozenset({"speed", "pause"})),
+    "barrier": (frozenset({"from", "to", "during"}), frozenset()),
+    "ramp": (frozenset({"from", "to", "rise", "width"}), frozenset()),
+    "hole": (frozenset({"low", "high"}), frozenset()),
+}
+"""Table -> keys it must have, keys it may have."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """One table of the file, with what is needed to say where an error is."""
+
+    path: Path
+    text: str
+    table: str
+    number: int
+    values: dict[str, Any]
+
+    def line(self, key: str | None = None) -> int:
+        """Return the line of the table's header, or of a key in it."""
+        lines = self.text.splitlines()
+        start, seen = 0, -1
+        for index, line in enumerate(lines):
+            if self.table and re.match(rf"\s*\[\[\s*{re.escape(self.table)}\s*\]\]", line):
+                seen += 1
+                start = index
+                if seen == self.number:
+                    break
+        if key is None:
+            return start + 1
+        for index in range(start if self.table else 0, len(lines)):
+            if re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", lines[index]):
+                return index + 1
+        return start + 1
+
+    def refuse(self, reason: str, key: str | None = None) -> BadWorld:
+        """Return the error with file and line."""
+        where = f"[[{self.table}]] " if self.table else ""
+        return BadWorld(f"{self.path}:{self.line(key)}: {where}{reason}")
+
+    def check_keys(self) -> None:
+        must, may = KEYS[self.table]
+        for key in self.values:
+            if key not in must | may and not (not self.table and key in KEYS):
+                raise self.refuse(f"unknown key '{key}'; known are {', '.join(sorted(must | may))}", key)
+        for key in sorted(must - self.values.keys()):
+            raise self.refuse(f"key '{key}' is missing")
+
+    def numbers(self, key: str, count: int) -> tuple[float, ...]:
+        """Return a list of so many finite numbers."""
+        return self.checked(self.values[key], key, count)
+
+    def checked(self, value: object, key: str, count: int) -> tuple[float, ...]:
+        """Return value as so many finite numbers."""
+        good = isinstance(value, list) and len(value) == count
+        if not good or not all(_is_number(item) for item in value):  # type: ignore[attr-defined]
+            raise self.refuse(f"'{key}' must be {count} numbers, is {value!r}", key)
+        return tuple(float(item) for item in value)  # type: ignore[attr-defined]
+
+    def number_of(self, key: str, default: float, low: float, high: float) -> float:
+        """Return one number within limits."""
+        value = self.values.get(key, default)
+        if not _is_number(value) or not low <= value <= high:
+            raise self.refuse(f"'{key}' must be a number from {low:g} to {high:g}, is {value!r}", key)
+        return float(value)
+
+    def choice(self, key: str, default: str, allowed: list[str]) -> str:
+        """Return one of the allowed words."""
+        value = self.values.get(key, default)
+        if value not in allowed:
+            raise self.refuse(f"'{key}' must be one of {', '.join(allowed)}, is {value!r}", key)
+        return str(value)
+
+    def point(self, key: str) -> tuple[float, float]:
+        """Return x, y."""
+        x, y = self.numbers(key, 2)
+        return x, y
+
+    def points(self, key: str) -> list[tuple[float, float]]:
+        """Return at least two points."""
+        value = self.values[key]
+        if not isinstance(value, list) or len(value) < 2:
+            raise self.refuse(f"'{key}' must be a list of at least two points", key)
+        return [(x, y) for x, y in (self.checked(item, key, 2) for item in value)]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def load_toml(path: Path, *, day: int = 0) -> World:
+    """Read a world description. Raises BadWorld with file and line."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        document = tomllib.loads(text)
+    except FileNotFoundError as error:
+        raise BadWorld(f"{path}: no such file") from error
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise BadWorld(f"{path}: not a readable TOML file ({error})") from error
+    top = _Entry(path, text, "", 0, document)
+    top.check_keys()
+    entries = {table: _entries(top, table) for table in KEYS if table}
+    plan = FloorPlan(f"{path}")
+    for table in ("wall", "room", "door"):
+        for entry in entries[table]:
+            _ADD[table](plan, entry, day)
+    for table in ("furniture", "person", "barrier"):
+        for entry in entries[table]:
+            _ADD[table](plan, entry, day)
+    _floors(plan, entries["ramp"], entries["hole"])
+    if "dock" in document:
+        plan.dock = _pose(top, "dock")
+    spawn = _pose(top, "spawn") if "spawn" in document else None
+    try:
+        return plan.build(spawn, str(document.get("description", path.name)), name=str(document["name"]))
+    except BadWorld as error:
+        raise BadWorld(f"{path}:{top.line('spawn')}: {str(error).removeprefix(f'{path}: ')}") from error
+
+
+def _pose(entry: _Entry, key: str) -> Pose2:
+    x, y, yaw = entry.numbers(key, 3)
+    return x, y, yaw
+
+
+def _entries(top: _Entry, table: str) -> list[_Entry]:
+    tables = top.values.get(table, [])
+    if not isinstance(tables, list) or not all(isinstance(item, dict) for item in tables):
+        raise top.refuse(f"write [[{table}]], one table each", table)
+    entries = [_Entry(top.path, top.text, table, index, item) for index, item in enumerate(tables)]
+    for entry in entries:
+        entry.check_keys()
+    return entries
+
+
+def _wall(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+    surface = Surface(entry.choice("surface", "wall", ["wall", "glass", "dark"]))
+    for start, end in pairwise(entry.points("points")):
+        if start == end:
+            raise entry.refuse(f"wall from {start} to itself", "points")
+        plan.wall(
+            start,
+            end,
+            thickness_m=entry.number_of("thickness", 0.12, 0.01, 2.0),
+            height_m=entry.number_of("height", 2.4, 0.02, 10.0),
+            surface=surface,
+        )
+
+
+def _room(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+    low, high = entry.point("low"), entry.point("high")
+    if not (low[0] < high[0] and low[1] < high[1]):
+        raise entry.refuse("'low' must lie left of and below 'high'", "low")
+    plan.room(str(entry.values["name"]), low, high, kind=str(entry.values.get("kind", "room")))
+
+
+def _door(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+    rooms = entry.values["rooms"]
+    if not isinstance(rooms, list) or len(rooms) != 2:
+        raise entry.refuse("'rooms' must be the names of two rooms", "rooms")
+    name = str(entry.values.get("name", f"door {entry.number + 1}"))
+    width = entry.number_of("width", 0.95, 0.4, 10.0)
+    try:
+        door = plan.door(name, entry.point("at"), (str(rooms[0]), str(rooms[1])), width_m=width)
+    except BadWorld as error:
+        raise entry.refuse(f"door '{name}' at {entry.values['at']} lies in no wall", "at") from error
+    leaf = entry.choice("leaf", "none", ["none", "swings", "closed"])
+    if leaf == "none":
+        return
+    (x0, y0), (x1, y1) = door.ends
+    yaw = math.atan2(y1 - y0, x1 - x0)
+    share = 0.0 if leaf == "closed" else 0.5
+    period = entry.number_of("period", 60.0, 5.0, 1e6)
+    plan.mover(SwingDoor((x0, y0), yaw, math.dist(*door.ends) - 0.02, period, share))
+
+
+def _furniture(plan: FloorPlan, entry: _Entry, day: int) -> None:
+    kind = entry.choice("kind", "", list(FURNITURE))
+    x, y, yaw = entry.numbers("at", 3)
+    moved = entry.values.get("moved", [])
+    if not isinstance(moved, list):
+        raise entry.refuse("'moved' must be a list of [day, x, y, yaw]", "moved")
+    for item in moved:
+        from_day, *place = entry.checked(item, "moved", 4)
+        if from_day <= day:
+            x, y, yaw = place
+    for box in FURNITURE[kind](x, y, yaw):
+        plan.box(box)
+
+
+def _person(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+    plan.mover(
+        Person(
+            tuple(entry.points("points")),
+            entry.number_of("speed", 1.1, 0.05, 3.0),
+            entry.number_of("pause", 0.0, 0.0, 1e6),
+        )
+    )
+
+
+def _barrier(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+    (x0, y0), (x1, y1) = entry.point("from"), entry.point("to")
+    begin_s, end_s = entry.numbers("during", 2)
+    half = (max(math.hypot(x1 - x0, y1 - y0) / 2, 0.05), 0.05, 0.5)
+    box = Box(((x0 + x1) / 2, (y0 + y1) / 2, 0.5), half, math.atan2(y1 - y0, x1 - x0))
+    plan.mover(Appearing((box,), begin_s, end_s))
+
+
+_ADD: dict[str, Callable[[FloorPlan, _Entry, int], None]] = {
+    "wall": _wall,
+    "room": _room,
+    "door": _door,
+    "furniture": _furniture,
+    "person": _person,
+    "barrier": _barrier,
+}
+
+
+def _floors(plan: FloorPlan, ramps: list[_Entry], holes: list[_Entry]) -> None:
+    """Lay a floor with holes, and ramps on it; a world without both needs no floor."""
+    if not ramps and not holes:
+        return
+    plan.flat = False
+    areas = [plan.outline(MARGIN_M)]
+    for entry in holes:
+        low, high = entry.point("low"), entry.point("high")
+        areas = [piece for area in areas for piece in _without(area, (*low, *high))]
+    for x0, y0, x1, y1 in areas:
+        centre = ((x0 + x1) / 2, (y0 + y1) / 2, -FLOOR_SLAB_M / 2)
+        half = ((x1 - x0) / 2, (y1 - y0) / 2, FLOOR_SLAB_M / 2)
+        plan.box(Box(centre, half, surface=Surface.FLOOR))
+    for entry in ramps:
+        plan.box(_ramp(entry))
+
+
+def _ramp(entry: _Entry) -> Box:
+    (x0, y0), (x1, y1) = entry.point("from"), entry.point("to")
+    rise = entry.number_of("rise", 0.1, -5.0, 5.0)
+    run = math.hypot(x1 - x0, y1 - y0)
+    if run < 0.1 or abs(rise) > 0.27 * run:
+        raise entry.refuse("a ramp steeper than 15 degrees cannot be driven", "rise")
+    pitch, yaw, thick = math.atan2(rise, run), math.atan2(y1 - y0, x1 - x0), 0.05
+    shift = math.sin(pitch) * thick
+    centre = (
+        (x0 + x1) / 2 + shift * math.cos(yaw),
+        (y0 + y1) / 2 + shift * math.sin(yaw),
+        rise / 2 - math.cos(pitch) * thick,
+    )
+    half = (math.hypot(run, rise) / 2, entry.number_of("width", 1.2, 0.4, 20.0) / 2, thick)
+    return Box(centre, half, yaw, pitch, Surface.FLOOR)
+
+
+def _without(area: Area, hole: Area) -> list[Area]:
+    """Return what is left of a rectangle without another: at most four rectangles."""
+    x0, y0, x1, y1 = area
+    hx0, hy0, hx1, hy1 = max(x0, hole[0]), max(y0, hole[1]), min(x1, hole[2]), min(y1, hole[3])
+    if hx0 >= hx1 or hy0 >= hy1:
+        return [area]
+    pieces = [(x0, y0, hx0, y1), (hx1, y0, x1, y1), (hx0, y0, hx1, hy0), (hx0, hy1, hx1, y1)]
+    return [piece for piece in pieces if piece[0] < piece[2] and piece[1] < piece[3]]

@@ -1,0 +1,137 @@
+"""Worlds: what they promise as ground truth is there, and bad descriptions are one line."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from sim import worlds
+from sim.errors import BadWorld
+from sim.raster import clearance_m
+
+HOME = """
+name = "home"
+spawn = [1.0, 1.0, 0.0]
+[[wall]]
+points = [[0, 0], [8, 0], [8, 5], [0, 5], [0, 0]]
+[[wall]]
+points = [[4, 0], [4, 5]]
+[[room]]
+name = "kitchen"
+low = [0, 0]
+high = [4, 5]
+[[room]]
+name = "hall"
+low = [4, 0]
+high = [8, 5]
+[[door]]
+at = [4.0, 2.5]
+rooms = ["kitchen", "hall"]
+leaf = "swings"
+[[furniture]]
+kind = "sofa"
+at = [6.0, 4.4, 0.0]
+moved = [[1, 6.0, 0.6, 0.0]]
+"""
+
+
+@pytest.mark.parametrize(
+    "name", ["office", "office@2", "offices:24:3", "loop:2:1", "campus:3:2", "storeys:2"]
+)
+def test_doors_of_the_ground_truth_can_be_driven_through_and_join_their_rooms(name):
+    world = worlds.load(name)
+    rooms = {room.name: room for room in world.truth.rooms}
+    clearance = clearance_m(world.raster)
+    labels, _ = ndimage.label(clearance > 0.2)
+    spawn_label = labels[world.raster.cell(*world.spawn[:2])]
+    assert spawn_label
+    for door in world.truth.doors:
+        (x0, y0), (x1, y1) = door.ends
+        length = math.hypot(x1 - x0, y1 - y0)
+        nx, ny = -(y1 - y0) / length * 0.4, (x1 - x0) / length * 0.4
+        cx, cy = door.centre
+        sides = ((cx + nx, cy + ny), (cx - nx, cy - ny))
+        a, b = (rooms[room] for room in door.rooms)
+        assert any(a.contains(*p) and b.contains(*q) for p, q in (sides, sides[::-1])), door
+        if a.level == b.level == 0:
+            assert labels[world.raster.cell(cx, cy)] == spawn_label, door
+
+
+def test_generated_worlds_repeat_by_seed_and_differ_between_seeds():
+    assert worlds.load("offices:24:3").boxes == worlds.load("offices:24:3").boxes
+    assert worlds.load("offices:24:3").boxes != worlds.load("offices:24:4").boxes
+
+
+def test_sixty_rooms_are_sixty_rooms():
+    world = worlds.load("offices:60")
+    assert sum(room.kind == "room" for room in world.truth.rooms) == 60
+    assert len(world.truth.graph()) == len(world.truth.rooms)
+
+
+def test_copies_of_the_office_look_the_same_and_join_up():
+    world = worlds.load("office@3")
+    step = round(16.0 / world.raster.resolution_m)
+    first = world.raster.occupied[20:180, 30:300]
+    second = world.raster.occupied[20:180, 30 + step : 300 + step]
+    assert (first != second).sum() < 0.002 * first.sum() + 20  # cells that a wall's end cuts in half
+    assert "1/corridor" in world.truth.graph()["2/corridor"]
+
+
+def test_copies_of_a_map_stand_in_a_row(tmp_path):
+    grey = np.full((60, 80), 254, dtype=np.uint8)
+    grey[10, 10:70] = grey[50, 10:70] = grey[10:51, 10] = grey[10:51, 69] = 0
+    (tmp_path / "m.pgm").write_bytes(b"P5\n80 60\n255\n" + grey.tobytes())
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n")
+    one, three = worlds.load(tmp_path / "m.yaml"), worlds.load(f"{tmp_path / 'm.yaml'}@3")
+    assert three.raster.occupied.shape[1] > 3 * 60
+    assert len(three.boxes) == 3 * len(one.boxes) + 4
+
+
+def test_toml_world_is_built_and_furniture_moves_by_day(tmp_path):
+    path = tmp_path / "home.toml"
+    path.write_text(HOME)
+    world = worlds.load(path)
+    assert world.name == "home"
+    assert world.truth.graph() == {"kitchen": {"hall"}, "hall": {"kitchen"}}
+    assert len(world.movers) == 1
+    sofa = world.raster.cell(6.0, 4.4)
+    assert world.raster.occupied[sofa]
+    assert not worlds.load(path, day=1).raster.occupied[sofa]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "complaint"),
+    [
+        (
+            'kind = "sofa"',
+            'kind = "sofa"\ncolour = "red"',
+            r"home\.toml:22: \[\[furniture\]\] unknown key 'colour'",
+        ),
+        ("spawn = [1.0, 1.0, 0.0]", "spawn = [4.0, 0.5, 0.0]", r"home\.toml:3: spawn \(4, 0\.5\) overlaps"),
+        (
+            "at = [4.0, 2.5]",
+            "at = [5.0, 2.5]",
+            r"home\.toml:17: \[\[door\]\] door 'door 1' .* lies in no wall",
+        ),
+        ('kind = "sofa"', 'kind = "boat"', r"home\.toml:21: .*'kind' must be one of cabinet"),
+        ("low = [4, 0]", "low = [nan, 0]", r"home\.toml:14: .*'low' must be 2 numbers"),
+        ('name = "home"', "name = ", r"home\.toml: not a readable TOML file"),
+        ('name = "home"', 'name = "home"\nghosts = 3', r"home\.toml:3: unknown key 'ghosts'"),
+        ('rooms = ["kitchen", "hall"]', "", r"home\.toml:16: \[\[door\]\] key 'rooms' is missing"),
+    ],
+)
+def test_bad_world_files_are_one_line_with_file_and_place(tmp_path, before, after, complaint):
+    path = tmp_path / "home.toml"
+    path.write_text(HOME.replace(before, after))
+    with pytest.raises(BadWorld, match=complaint) as caught:
+        worlds.load(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["office@0", "office@x", "loop@2", "offices:5:x", "offices:99999", "gone.toml"]
+)
+def test_bad_names_are_refused(name):
+    with pytest.raises(BadWorld):
+        worlds.load(name)
