@@ -89,6 +89,15 @@ class MissionStatus:
     text: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a run ended."""
+
+    now_s: float
+    state: MissionState
+    text: str
+
+
 class Exchange:
     """The mailboxes, by the name of what lies in them."""
 

@@ -8,6 +8,7 @@ sounds           goal reached, goal given up, lost, stopped by contact, battery 
 from dataclasses import dataclass
 
 from drivers.kobuki.commands import Led, Tune
+from drivers.kobuki.session import KobukiSession
 from lemtomap.nav.types import NavState
 from robot.safety import Reason
 
@@ -44,6 +45,13 @@ class Play:
 
 
 Signal = Light | Play
+
+
+def signal_bytes(session: KobukiSession, signal: Signal) -> bytes:
+    """Return the command that lights a LED or plays a tune."""
+    if isinstance(signal, Light):
+        return session.led(signal.number, signal.colour)
+    return session.sound(signal.tune)
 
 
 class Indicators:

@@ -1,12 +1,10 @@
 """The robot and its simulated world, step by step on one virtual clock: fast, and the same every time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from drivers.kobuki.session import KobukiSession
 from robot.core import RobotCore, Samples
-from robot.exchange import MissionState
-from robot.feedback import Light, Signal
+from robot.exchange import Ended, MissionState
+from robot.feedback import signal_bytes
 from robot.missions import Mission
 from robot.wire import HOKUYO, KOBUKI, RecordedHokuyoSession, RecordedKobukiSession, Sink, Wire
 from sim.errors import Unplugged
@@ -14,15 +12,6 @@ from sim.simulator import Simulator
 
 PERIOD_NS = 20_000_000  # one feedback packet of the base
 SETTLE_STEPS = 50  # steps after the end of a mission, for the last scans and a standing robot
-
-
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """How a run ended."""
-
-    now_s: float
-    state: MissionState
-    text: str
 
 
 def run_lockstep(
@@ -64,13 +53,6 @@ def run_lockstep(
     status = core.exchange.mission.get()
     state, text = (status.state, status.text) if status else (MissionState.WAITING, "no map yet")
     return Ended(now_ns * 1e-9, state, text)
-
-
-def signal_bytes(session: KobukiSession, signal: Signal) -> bytes:
-    """Return the command that lights a LED or plays a tune."""
-    if isinstance(signal, Light):
-        return session.led(signal.number, signal.colour)
-    return session.sound(signal.tune)
 
 
 def _forget(_: object) -> None:
