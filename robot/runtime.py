@@ -5,7 +5,7 @@
     navigation      10 times a second
     onlooker        viewer and recorder; may be late, slows nobody
 
-Whatever ends the run - mission over, time up, SIGTERM, a crash in any thread - the robot's last bytes are a stop.
+Whatever ends the run (mission over, time up, SIGTERM, a crash in any thread), the last bytes are a stop.
 """
 
 import asyncio
@@ -34,7 +34,9 @@ OUTPUT_PERIOD_S = 0.02  # design, section 4
 LOOK_PERIOD_S = 0.1
 SETTLE_S = 1.0  # after a mission: the last scans, a standing robot
 JOIN_S = 5.0
-SWITCH_S = 0.001  # Python's threads hand over five times as often as usual, so that a stop never waits for a map
+SWITCH_S = (
+    0.001  # Python's threads hand over five times as often as usual, so that a stop never waits for a map
+)
 
 OpenPort = Callable[[], Awaitable[BytePort]]
 AnyEvent = KobukiEvent | HokuyoEvent | PortOpened | PortLost
@@ -79,7 +81,11 @@ class Runtime:
         sys.setswitchinterval(SWITCH_S)
         threads = [
             threading.Thread(target=self._guard, args=(work,), name=name, daemon=True)
-            for name, work in (("mapping", self._map), ("navigation", self._navigate), ("onlooker", self._look))
+            for name, work in (
+                ("mapping", self._map),
+                ("navigation", self._navigate),
+                ("onlooker", self._look),
+            )
         ]
         try:
             return asyncio.run(self._loop(threads, duration_s))
@@ -157,9 +163,7 @@ class Runtime:
 
     def _port_changed(self, device: str, event: PortOpened | PortLost) -> None:
         opened = isinstance(event, PortOpened)
-        self.onlooker.raw.put(
-            Entry(device, Call.PORT, stamp_ns(event.stamp_s), OPENED if opened else LOST)
-        )
+        self.onlooker.raw.put(Entry(device, Call.PORT, stamp_ns(event.stamp_s), OPENED if opened else LOST))
         if isinstance(event, PortLost):
             self.core.exchange.note(event.stamp_s, device, str(event.error), Level.WARN)
 
