@@ -88,15 +88,15 @@ class Link:
         self._to_device.clear()
         return data
 
-    def read(self) -> bytes:
-        """Host side: everything that has arrived."""
+    def read_frames(self) -> list[bytes]:
+        """Host side: everything that has arrived, in the pieces the device sent."""
         self._check()
-        now, pieces = self._clock() + 1e-9, []
+        now = self._clock() + 1e-9
+        frames: list[bytes] = []
         while self._to_host and self._to_host[0][0] <= now:
-            pieces.append(self._to_host.popleft()[1])
-        data = b"".join(pieces)
-        self._waiting -= len(data)
-        return data
+            frames.append(self._to_host.popleft()[1])
+            self._waiting -= len(frames[-1])
+        return frames
 
     def write(self, data: bytes) -> None:
         """Host side: send to the device."""
@@ -139,7 +139,11 @@ class HostPort:
 
     def read(self) -> bytes:
         """Return everything that has arrived by now, perhaps nothing. Raises Unplugged."""
-        return self._link.read()
+        return b"".join(self._link.read_frames())
+
+    def read_frames(self) -> list[bytes]:
+        """Return the same in the pieces the device sent (a replier that must not cut frames needs them)."""
+        return self._link.read_frames()
 
     def write(self, data: bytes) -> None:
         """Send to the device. Raises Unplugged."""

@@ -1,0 +1,180 @@
+"""The fake hardware in real time on two pseudo-terminals, for any program that speaks the protocols.
+
+    python -m sim.serve --world office
+
+The first line of output is {"kobuki": "/dev/pts/3", "hokuyo": "/dev/pts/4"}; it serves until interrupted. Its
+last line is the truth of the run: {"path_m": ..., "contacts": ..., "contact_s": ..., "pose": [x, y, yaw]}.
+"""
+
+import argparse
+import json
+import select
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from types import FrameType
+from typing import TextIO
+
+from sim import worlds
+from sim.errors import BadWorld, Unplugged
+from sim.link import HostPort
+from sim.pty_port import PtyPort
+from sim.simulator import STEP_S, Simulator
+
+LATE_S = 0.25  # a machine this far behind gives up the lost time instead of racing after it
+TRUTH_PERIOD_S = 0.1
+
+
+class PtyServer:
+    """Joins a simulator's cables to pseudo-terminals and keeps them in step with the wall clock."""
+
+    def __init__(self, simulator: Simulator, truth_log: TextIO | None = None) -> None:
+        self._simulator = simulator
+        self._pairs: list[tuple[HostPort, PtyPort]] = [
+            (simulator.kobuki, PtyPort()),
+            (simulator.hokuyo, PtyPort()),
+        ]
+        self._truth_log = truth_log
+        self._logged_s = 0.0
+        self.lost_s = 0.0
+        """Real time given up because the machine was too slow."""
+
+    @property
+    def kobuki_path(self) -> str:
+        """Path of the base's port."""
+        return self._pairs[0][1].path
+
+    @property
+    def hokuyo_path(self) -> str:
+        """Path of the laser's port."""
+        return self._pairs[1][1].path
+
+    @property
+    def dropped_frames(self) -> int:
+        """Frames that nobody read in time."""
+        return sum(pty.dropped_frames for _, pty in self._pairs)
+
+    def serve(self, stop: threading.Event, duration_s: float = float("inf")) -> None:
+        """Serve until stopped. Holds: simulated time never runs ahead of the wall clock."""
+        ahead_s = time.monotonic() - self._simulator.now_s
+        end_s = self._simulator.now_s + duration_s
+        while not stop.is_set() and self._simulator.now_s < end_s:
+            due_s = self._simulator.now_s + STEP_S + ahead_s
+            self._listen(due_s)
+            behind_s = time.monotonic() - due_s
+            if behind_s > LATE_S:
+                self.lost_s += behind_s
+                ahead_s += behind_s
+            self._simulator.advance(self._simulator.now_s + STEP_S)
+            self._send()
+            self._log_truth()
+
+    def _listen(self, until_s: float) -> None:
+        """Wait for the next step, taking commands as they come."""
+        while (left_s := until_s - time.monotonic()) > 0:
+            ready, _, _ = select.select([pty for _, pty in self._pairs], [], [], left_s)
+            for port, pty in self._pairs:
+                if pty in ready:
+                    _forward(port, pty.read())
+
+    def _send(self) -> None:
+        for port, pty in self._pairs:
+            try:
+                frames = port.read_frames()
+            except Unplugged:
+                continue
+            for frame in frames:
+                pty.write(frame)
+
+    def _log_truth(self) -> None:
+        if self._truth_log is None or self._simulator.now_s < self._logged_s + TRUTH_PERIOD_S:
+            return
+        self._logged_s = self._simulator.now_s
+        x, y, yaw = self._simulator.truth().T_world_base
+        self._truth_log.write(f"{self._logged_s:.3f} {x:.4f} {y:.4f} {yaw:.5f}\n")
+
+    def close(self) -> None:
+        """Hang up both ports. Closing twice is fine."""
+        for _, pty in self._pairs:
+            pty.close()
+        self._pairs.clear()
+
+
+def _forward(port: HostPort, data: bytes) -> None:
+    try:
+        port.write(data)
+    except Unplugged:
+        return  # bytes written to a pulled cable are lost
+
+
+def serve_world(world: str, seed: int, *, duration_s: float, truth_path: Path | None, gui: bool) -> None:
+    """Serve one world until SIGINT, SIGTERM or the end of the time. Raises BadWorld."""
+    stop = threading.Event()
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        stop.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    simulator = Simulator(worlds.load(world), seed, gui=gui)
+    truth_log = truth_path.open("w", encoding="utf-8", buffering=1) if truth_path is not None else None
+    server = PtyServer(simulator, truth_log)
+    try:
+        _say({"kobuki": server.kobuki_path, "hokuyo": server.hokuyo_path})
+        server.serve(stop, duration_s)
+    finally:
+        truth = simulator.truth()
+        server.close()
+        simulator.close()
+        if truth_log is not None:
+            truth_log.close()
+    _say(
+        {
+            "path_m": round(truth.path_m, 3),
+            "contacts": truth.contact_count,
+            "contact_s": round(truth.contact_s, 2),
+            "pose": [round(float(value), 4) for value in truth.T_world_base],
+            "lost_s": round(server.lost_s, 2),
+        }
+    )
+
+
+def _say(answer: dict[str, object]) -> None:
+    try:
+        sys.stdout.write(json.dumps(answer) + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        return  # whoever started us has gone; the ports may still be in use
+
+
+def main() -> int:
+    """Read the arguments and serve."""
+    parser = argparse.ArgumentParser(prog="python -m sim.serve", description="The fake hardware alone.")
+    parser.add_argument(
+        "--world", default=worlds.names()[0], help="a built-in world, a map .yaml or a world .toml"
+    )
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--duration", type=float, default=float("inf"), help="seconds; default: until interrupted"
+    )
+    parser.add_argument("--truth", type=Path, default=None, help="write the true poses to this file, 10 Hz")
+    parser.add_argument("--gui", action="store_true", help="open pybullet's window")
+    arguments = parser.parse_args()
+    try:
+        serve_world(
+            arguments.world,
+            arguments.seed,
+            duration_s=arguments.duration,
+            truth_path=arguments.truth,
+            gui=arguments.gui,
+        )
+    except BadWorld as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
