@@ -38,6 +38,8 @@ class MappingStep:
 
     def step(self, timed: TimedScan) -> None:
         """Map one scan and publish what is known now."""
+        for event in self._exchange.nav_events.drain():
+            self.mapper.apply(event)
         update = self.slam.update(timed.scan, timed.odometry)
         self.mapper.update(update, self.slam.view(), timed.sighting.hits_base)
         self.scans += 1

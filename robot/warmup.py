@@ -1,8 +1,8 @@
 """Running every compiled kernel once before the robot may move.
 
 The first use of a kernel on a machine compiles it (later uses load it from the cache); neither may happen
-while the loop thread has to stop the robot within milliseconds. So a robot of its own, with a map that is thrown
-away, drives through an imagined room first.
+while the loop thread has to stop the robot within milliseconds. So a robot of its own, with a map that is
+thrown away, drives through an imagined room first.
 """
 
 import tempfile
