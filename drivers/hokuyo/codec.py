@@ -182,12 +182,16 @@ class _Expected:
         line = 0
         for row, slot in zip(rows, slots, strict=True):
             size = sizes[line]
-            values = digits_of(row + b"\n")[None, :]
-            if slot == 1 and len(row) == size + 1 and _lines_right(values).all():
-                digits[line * BLOCK : line * BLOCK + size] = values[0, :-2]
+            if slot == 1 and len(row) == size + 1 and _line_right(row):
+                digits[line * BLOCK : line * BLOCK + size] = digits_of(row[:-1])
                 intact[line * BLOCK : line * BLOCK + size] = True
             line += slot
         return (digits, intact) if intact.any() else None
+
+
+def _line_right(row: bytes) -> bool:
+    data = row[:-1]
+    return row[-1] == line_sum(data) and min(data) >= 0x30 and max(data) <= 0x6F
 
 
 def _lines_right(table: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -95,7 +95,9 @@ class Connection:
         following = QUESTIONS[self.step].unanswered
         if self.step is Step.QUIET and self._switched:
             following = Step.FAILED
-        if following is not Step.FAILED:
+        if self.step is Step.STATE:
+            self._take_state(None)
+        elif following is not Step.FAILED:
             self._go(following)
         elif self.step in {Step.QUIET, Step.SWITCH}:
             self._fail("the laser does not answer: check the cable, or unplug it and plug it in again")

@@ -80,8 +80,8 @@ class ScanMaker:
             angle_min_rad=self._angle_min_rad,
             angle_step_rad=self._angle_step_rad,
             time_step_s=self._time_step_s,
-            range_min_m=1e-3 * self.sensor.min_mm,
-            range_max_m=1e-3 * self.sensor.max_mm,
+            range_min_m=self.sensor.min_mm / 1000.0,
+            range_max_m=self.sensor.max_mm / 1000.0,
             complete=frame.intact,
             missed=missed,
         )

@@ -92,7 +92,7 @@ class HokuyoSession:
         self._failures = 0
         self._fault = ""
         self._rest_until_s = float("-inf")
-        self._last_tick_s: float | None = None
+        self._listened_until_s: float | None = None
         self._connection = self._new_connection(None, ask_version=True)
         self._listen_afresh()
 
@@ -128,12 +128,12 @@ class HokuyoSession:
 
     def tick(self, now_s: float) -> bytes:
         """Return what to send now, and watch for answers and scans that do not come."""
-        slept_s = 0.0 if self._last_tick_s is None else now_s - self._last_tick_s
-        self._last_tick_s = now_s
+        listened_s = 0.0 if self._listened_until_s is None else now_s - self._listened_until_s
+        self._listened_until_s = now_s
         if self._stranger or now_s < self._rest_until_s:
             return b""
         if self.step is Step.STREAM:
-            self._silent_s += min(slept_s, 0.1)  # a host that slept did not listen
+            self._silent_s += min(listened_s, 0.1)  # a host that slept did not listen
             if self._silent_s > self._patience_s():
                 self._break_off(now_s, f"no scan for {self._silent_s:.1f} s", self._queue)
         command = self._connection.command(now_s)
@@ -167,7 +167,7 @@ class HokuyoSession:
             self.counters.implausible += 1
             return
         missed = self._count(frame, maker)
-        self._silent_s = 0.0
+        self._silent_s, self._listened_until_s = 0.0, now_s
         self._checking = False
         if not self.alive:
             self.alive = True

@@ -92,7 +92,7 @@ class KobukiSession:
         self._queue: list[KobukiEvent] = []
         self._ever_alive = False
         self._silent_s = 0.0
-        self._last_tick_s: float | None = None
+        self._listened_until_s: float | None = None
         self._probed = False
         self._foreign: bytearray | None = bytearray()
 
@@ -117,9 +117,9 @@ class KobukiSession:
     def tick(self, now_s: float) -> bytes:
         """Return the requests to send now, and watch for silence."""
         config = self.config
-        if self._last_tick_s is not None:  # a host that slept did not listen: count no more than one silence
-            self._silent_s += min(now_s - self._last_tick_s, config.silence_s)
-        self._last_tick_s = now_s
+        if self._listened_until_s is not None:  # a host that slept did not listen: count one silence at most
+            self._silent_s += min(now_s - self._listened_until_s, config.silence_s)
+        self._listened_until_s = now_s
         if self.alive and self._silent_s > config.silence_s:
             self.alive = False
             self._queue.append(LinkDown(now_s, f"no packet from the base for {self._silent_s:.2f} s"))
@@ -184,7 +184,7 @@ class KobukiSession:
             events.append(BadFrame(b"", f"implausible: {reason or 'the timestamp does not fit the clock'}"))
             return
         self.counters.frames += 1
-        self._silent_s = 0.0
+        self._silent_s, self._listened_until_s = 0.0, now_s
         if not self.alive:
             self.alive = self._ever_alive = True
             self._foreign = None
