@@ -219,7 +219,7 @@ class Navigator:
         if goal is None:
             return
         beyond = 0 if self._target is None else self._target.index
-        barrier = find_barrier(route, goal, places, reach, beyond)
+        barrier = find_barrier(route, places, reach, beyond)
         if barrier is None and self._plan is not None:
             way_m = np.inf if self._barriers.watching else self._plan.length_m
             barrier = find_detour(route, goal, places, reach.costs, beyond, way_m)

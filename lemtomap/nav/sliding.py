@@ -4,6 +4,7 @@ The goal slides along the route while the robot drives; nothing is cancelled and
 stammer between nodes (thesis, 5-2-2 and Figure 5-13).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -84,13 +85,13 @@ def choose_target(
     return unproven
 
 
-def find_barrier(
-    route: Route, goal: Goal, T_grid_node: Mapping[int, Pose], reach: Reach, beyond: int
-) -> Barrier | None:
-    """Return the first edge after route index `beyond` whose far end is in the window but out of reach."""
+def find_barrier(route: Route, T_grid_node: Mapping[int, Pose], reach: Reach, beyond: int) -> Barrier | None:
+    """Return the first edge after route index `beyond` whose far end is in the window but out of reach.
+
+    A goal beside its node that is out of reach says nothing about the edge to the node.
+    """
     for index in range(beyond, len(route.nodes) - 1):
-        near = place_of(route, index, goal, T_grid_node)
-        far = place_of(route, index + 1, goal, T_grid_node)
+        near, far = (T_grid_node.get(route.nodes[end]) for end in (index, index + 1))
         if near is None or far is None or not reach.costs.holds(far, BORDER_M):
             return None
         if reach.nearest(far, SNAP_M) is None:
@@ -107,11 +108,12 @@ def find_detour(
     door does, even where the window shows another way round.
     """
     route_m = sum(edge.length_m for edge in route.edges[:upto])
+    if upto == len(route.nodes) - 1:
+        route_m += math.hypot(*goal.p_node)
     if way_m < DETOUR_SHARE * route_m + DETOUR_M:
         return None
     for index in range(upto):
-        near = place_of(route, index, goal, T_grid_node)
-        far = place_of(route, index + 1, goal, T_grid_node)
+        near, far = (T_grid_node.get(route.nodes[end]) for end in (index, index + 1))
         if near is None or far is None or not (costs.holds(near) and costs.holds(far)):
             continue
         if kernels.worst_on_line(costs.cost, costs.state, *costs.cell(near), *costs.cell(far)) == 2:
