@@ -39,11 +39,11 @@ class PlaceKeeper:
         self.hits = HitMap()
         self._graph = graph
         self._describe = describe
-        self._due: dict[int, bool] = {}
+        self._due: dict[int, None] = {}
 
     def due(self, node_id: int) -> None:
         """Have a node's data taken when the time has come."""
-        self._due[node_id] = False
+        self._due[node_id] = None
 
     def observe(self, T_grid_base: Pose, points_base: NDArray[np.floating] | None) -> None:
         """Take in a scan's hits, float (N, 2), metres, base frame."""
@@ -51,26 +51,18 @@ class PlaceKeeper:
             self.hits.add(T_grid_base, points_base)
 
     def take_ripe(
-        self,
-        standings: dict[int, Standing],
-        associated_id: int,
-        T_grid_base: Pose,
-        grid: GridView,
-        now_s: float,
+        self, standings: dict[int, Standing], T_grid_base: Pose, grid: GridView, now_s: float
     ) -> list[Taken]:
-        """Take the data of nodes the robot has left: a draft at once, the final one from further away."""
+        """Take the data of due nodes that the robot has left far enough behind."""
         taken = []
-        for node_id, drafted in list(self._due.items()):
+        for node_id in list(self._due):
             standing = standings.get(node_id)
             if standing is None or not standing.anchored:
-                del self._due[node_id]  # forgotten before it was ripe: the draft stays
+                del self._due[node_id]  # forgotten before it was ripe
                 continue
             away_m = float(np.hypot(*(standing.T_grid_node[:2] - T_grid_base[:2])))
-            ripe = away_m >= self.config.place_taken_at_m
-            if ripe or (not drafted and node_id != associated_id):
+            if away_m >= self.config.place_taken_at_m:
                 taken += self._take(node_id, standing, grid, now_s)
-                self._due[node_id] = True
-            if ripe:
                 del self._due[node_id]
         return taken
 

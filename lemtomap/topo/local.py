@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lemtomap.se2 import Pose, compose
-from lemtomap.topo.graph import Covariance, Edge, chain_covariance
+from lemtomap.se2 import Pose
+from lemtomap.topo import kernels
+from lemtomap.topo.graph import Covariance, Edge
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.solve import Problem, solve_local
 from lemtomap.types import GridView
@@ -80,9 +81,14 @@ class LocalMap:
             elif reached.via is not None:
                 from_id = reached.via.other(node_id)
                 before = settled[from_id]
-                step = reached.via.seen_from(from_id)
-                covariance = chain_covariance(before.covariance, step, reached.via.covariance_from(from_id))
-                settled[node_id] = Standing(compose(before.T_grid_node, step), covariance, anchored=False)
+                T_grid_node, covariance = kernels.carried(
+                    before.T_grid_node,
+                    before.covariance,
+                    reached.via.T_source_target,
+                    reached.via.covariance,
+                    int(reached.via.target_id == from_id),
+                )
+                settled[node_id] = Standing(T_grid_node, covariance, anchored=False)
         self.standings = self._solved(settled)
 
     def _solved(self, settled: dict[int, Standing]) -> dict[int, Standing]:

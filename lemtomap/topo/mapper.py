@@ -1,5 +1,6 @@
 """Topological SLAM, one scan at a time (thesis, Figure 3-6): associate, or be born and join."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -7,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.errors import LemtomapError
-from lemtomap.se2 import Pose, adjoint, between, compose
+from lemtomap.se2 import Pose, adjoint, compose
+from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import NavEvent
 from lemtomap.topo.graph import Covariance, Edge, Place, chain_covariance
@@ -112,7 +114,7 @@ class TopoMapper:
     @property
     def T_node_base(self) -> Pose:  # noqa: N802 - a frame's name
         """Where the robot is relative to the associated node."""
-        return between(self._pose_of(self._associated_id), self._require().slam.T_grid_base)
+        return kernels.pose_between(self._pose_of(self._associated_id), self._require().slam.T_grid_base)
 
     @property
     def transform(self) -> Transform:
@@ -152,10 +154,9 @@ class TopoMapper:
 
     def _move(self, before: SlamUpdate, after: SlamUpdate) -> None:
         """Let the covariance of T_node_base grow by the motion since the previous scan."""
-        step = between(before.T_grid_base, after.T_grid_base)
-        turn = _turned(-step[2])
-        self._drift = chain_covariance(self._drift, step, turn @ after.step_covariance @ turn.T)
-        self.travelled_m += float(np.hypot(step[0], step[1]))
+        from_base, to_base = before.T_grid_base, after.T_grid_base
+        self._drift = kernels.drifted(self._drift, from_base, to_base, after.step_covariance)
+        self.travelled_m += math.hypot(to_base[0] - from_base[0], to_base[1] - from_base[1])
 
     def _associate_or_create(self) -> None:
         """Only a neighbour or a new node can come next, and only one that no wall hides.
@@ -186,8 +187,8 @@ class TopoMapper:
         return nearest_id
 
     def _distance_m(self, node_id: int) -> float:
-        (x, y, _), (node_x, node_y, _) = self._require().slam.T_grid_base, self._pose_of(node_id)
-        return float(np.hypot(node_x - x, node_y - y))
+        at, node = self._require().slam.T_grid_base, self._pose_of(node_id)
+        return math.hypot(node[0] - at[0], node[1] - at[1])
 
     def _sees(self, node_id: int) -> bool:
         now = self._require()
@@ -246,9 +247,8 @@ class TopoMapper:
         else:
             self._transform = self._measured(node_id)
         standing = self.local.standings[node_id]
-        T_node_base = between(standing.T_grid_node, self._require().slam.T_grid_base)
-        slam = self._require().slam
-        self._drift = chain_covariance(standing.covariance, T_node_base, _relative_to_window(slam))
+        seen = _relative_to_window(self._require().slam)
+        self._drift = chain_covariance(standing.covariance, self.T_node_base, seen)
         self.local.settle(node_id)
 
     def _measured(self, node_id: int) -> Transform:
@@ -277,9 +277,8 @@ class TopoMapper:
 
     def _take_places(self) -> None:
         now = self._require()
-        taken = self.keeper.take_ripe(
-            self.local.standings, self._associated_id, now.slam.T_grid_base, now.grid, now.slam.stamp_s
-        )
+        slam = now.slam
+        taken = self.keeper.take_ripe(self.local.standings, slam.T_grid_base, now.grid, slam.stamp_s)
         self._tell(taken)
 
     def _tell(self, taken: list[Taken]) -> None:

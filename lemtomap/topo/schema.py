@@ -20,8 +20,8 @@ _MAGIC = b"SQLite format 3\0"
 
 SCHEMA = """
 CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
-CREATE TABLE node(id INTEGER PRIMARY KEY, area INT, level INT, created REAL, visits INT, doubts INT,
-                  taken REAL, boundary BLOB, descriptor BLOB);
+CREATE TABLE node(id INTEGER PRIMARY KEY, area INT, level INT, created REAL, visits INT, doubts INT);
+CREATE TABLE place(node INTEGER PRIMARY KEY, taken REAL, boundary BLOB, descriptor BLOB);
 CREATE TABLE edge(id INTEGER PRIMARY KEY, source INT, target INT, type INT, share INT,
                   time REAL, blocked REAL, measure BLOB);
 CREATE INDEX edge_source ON edge(source);

@@ -25,6 +25,7 @@ from lemtomap.topo.rows import (
     placeholder_from,
 )
 
+COMPACT_BELOW_BYTES = 8 << 20  # rewriting a map of this size on closing takes some 50 ms
 KEPT_CHANGES = 8192  # a reader further behind than this reads afresh
 
 
@@ -117,6 +118,8 @@ class TopoStore:
             ):  # a reader holds the file: it stays in WAL mode
                 self._db.execute("PRAGMA busy_timeout = 0")
                 self._db.execute("PRAGMA journal_mode = DELETE")
+                if self.path.stat().st_size < COMPACT_BELOW_BYTES:
+                    self._db.execute("VACUUM")
         finally:
             self._db.close()
 
@@ -177,14 +180,14 @@ class TopoStore:
         """Remove a node with its edges, names and marks. Its ID stays used for ever."""
         for edge in self.edges_of(node_id):
             self.delete_edge(edge.edge_id)
-        for table in ("name", "placeholder", "mark"):
+        for table in ("name", "place", "placeholder", "mark"):
             self._write(f"DELETE FROM {table} WHERE node = ?", (node_id,))  # noqa: S608
         self._write("DELETE FROM node WHERE id = ?", (node_id,))
         self.set_meta("next_node", self._next_node)
 
     def place(self, node_id: int) -> Place | None:
         """Return a node's localisation data, None when it has none yet."""
-        sql = "SELECT taken, boundary, descriptor FROM node WHERE id = ? AND boundary IS NOT NULL"
+        sql = "SELECT taken, boundary, descriptor FROM place WHERE node = ?"
         for taken_s, boundary, descriptor in self.query(sql, (node_id,)):
             return Place(taken_s, boundary, descriptor or b"")
         return None
@@ -192,16 +195,13 @@ class TopoStore:
     def put_place(self, node_id: int, place: Place) -> None:
         """Write a node's localisation data over what it had."""
         self._write(
-            "UPDATE node SET taken = ?, boundary = ?, descriptor = ? WHERE id = ?",
-            (place.taken_s, place.boundary, place.descriptor or None, node_id),
+            "REPLACE INTO place(node, taken, boundary, descriptor) VALUES(?, ?, ?, ?)",
+            (node_id, place.taken_s, place.boundary, place.descriptor or None),
         )
 
     def places(self, after_id: int = 0) -> Iterator[tuple[int, Place]]:
         """Iterate over (node ID, localisation data) of all nodes beyond `after_id` that have it, by ID."""
-        sql = (
-            "SELECT id, taken, boundary, descriptor FROM node "
-            "WHERE id > ? AND boundary IS NOT NULL ORDER BY id"
-        )
+        sql = "SELECT node, taken, boundary, descriptor FROM place WHERE node > ? ORDER BY node"
         for node_id, taken_s, boundary, descriptor in self.query(sql, (after_id,)):
             yield node_id, Place(taken_s, boundary, descriptor or b"")
 

@@ -4,10 +4,12 @@ A ring of cells with a fixed size, like the window itself: memory is flat, and w
 overwritten by what it meets next.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, between, transform
+from lemtomap.se2 import Pose, transform
 from lemtomap.topo.align import kernels
 from lemtomap.types import GridView
 
@@ -29,8 +31,8 @@ class HitMap:
     def add(self, T_grid_base: Pose, points_base: NDArray[np.floating]) -> None:
         """Take in a scan's hits, float (N, 2), metres, base frame, when the robot has moved a little."""
         if self._last is not None:
-            moved = between(self._last, T_grid_base)
-            if np.hypot(moved[0], moved[1]) < EVERY_M and abs(moved[2]) < EVERY_RAD:
+            dx, dy, turn = (T_grid_base - self._last).tolist()
+            if math.hypot(dx, dy) < EVERY_M and 1.0 - math.cos(turn) < 0.5 * EVERY_RAD**2:
                 return
         self._last = np.array(T_grid_base)
         kernels.add_hits(transform(T_grid_base, points_base), CELL_M, self._owner, self._sums)

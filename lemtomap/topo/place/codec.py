@@ -1,4 +1,4 @@
-"""Obstacle boundary ⇄ bytes. Decimetre cells and, across the wall, two-centimetre offsets.
+"""Obstacle boundary ⇄ bytes. Decimetre cells and, across the wall, offsets of a quarter cell.
 
 A wall's place across itself is what a match needs; along itself a decimetre is enough. So each set cell
 carries one small number: how far its points lie from the cell's middle along the boundary's normal, and the
@@ -15,11 +15,11 @@ from lemtomap.topo.place import kernels
 
 FORMAT = 1
 CELL_M = 0.1
-OFFSET_STEP_M = 0.02
+OFFSET_STEP_M = 0.025
 NORMAL_REACH_CELLS = 2
 HEADER_BYTES = 2
 MAX_RADIUS_M = 12.0
-SHRINK = 0.9  # each try at the byte budget keeps this much of the radius
+SHRINK = 0.95  # each try at the byte budget keeps at most this much of the radius
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def encode_place(
         code = bytes([FORMAT, cells]) + _encode(points, cells)
         if byte_budget is None or len(code) <= byte_budget or cells == 1:
             return code
-        radius_m *= SHRINK
+        radius_m = min(SHRINK, (byte_budget / len(code)) ** 0.7) * cells * CELL_M
 
 
 def decode_place(blob: bytes) -> Boundary:
@@ -58,7 +58,7 @@ def decode_place(blob: bytes) -> Boundary:
         raise BadMap("localisation data of an unknown format")
     cells = blob[1]
     bitmap, levels = _canvas(cells), _canvas(cells).astype(np.int8)
-    kernels.decode(np.frombuffer(blob, np.uint8, offset=HEADER_BYTES), bitmap, levels)
+    kernels.decode(np.frombuffer(blob, np.uint8, offset=HEADER_BYTES), bitmap, levels, NORMAL_REACH_CELLS)
     shape = kernels.cell_normals(bitmap, CELL_M, NORMAL_REACH_CELLS)
     offsets_m = levels[bitmap > 0].astype(np.float64) * OFFSET_STEP_M
     points = shape[:, :2] + offsets_m[:, None] * shape[:, 2:4]
@@ -78,8 +78,9 @@ def _encode(points: NDArray[np.float64], cells: int) -> bytes:
     across_m = np.sum((means[bitmap > 0] - shape[:, :2]) * shape[:, 2:4], axis=1)
     limit = kernels.LEVELS // 2
     levels = _canvas(cells).astype(np.int8)
-    levels[bitmap > 0] = np.clip(np.rint(across_m / OFFSET_STEP_M), -limit, limit)
-    return bytes(kernels.encode(bitmap, levels))
+    steps = np.clip(np.rint(across_m / OFFSET_STEP_M), -limit, limit)
+    levels[bitmap > 0] = np.where(shape[:, 4] < kernels.STRAIGHT, 0, steps)
+    return bytes(kernels.encode(bitmap, levels, NORMAL_REACH_CELLS))
 
 
 def _canvas(cells: int) -> NDArray[np.uint8]:

@@ -18,7 +18,8 @@ Values = NDArray[np.float64]
 ONE = 65536
 LIMIT = 60  # how far back a context remembers: steady in a small picture
 BITMAP_CONTEXTS = 128
-LEVELS = 7  # offsets -3..3
+LEVELS = 5  # offsets -2..2
+STRAIGHT = 0.6  # only where the boundary has a direction there is an offset across it
 LEVEL_CONTEXTS = (LEVELS + 1) * 8
 
 
@@ -111,8 +112,8 @@ def level_context(bitmap: Bits, levels: Levels, row: int, col: int) -> int:
 
 
 @njit(nogil=True, cache=True)
-def encode(bitmap: Bits, levels: Levels) -> Bits:
-    """Return the coded bitmap and the offset levels of its set cells; both have a border of two cells."""
+def encode(bitmap: Bits, levels: Levels, reach: int) -> Bits:
+    """Return the coded bitmap and the offset levels of its straight cells; both with a border of two."""
     rows, cols = bitmap.shape
     out = np.zeros(rows * cols + 16, np.uint8)
     state = np.array([0, 0xFFFFFFFF, 0], np.int64)
@@ -120,9 +121,12 @@ def encode(bitmap: Bits, levels: Levels) -> Bits:
     for row in range(2, rows - 2):
         for col in range(2, cols - 2):
             put_bit(state, out, tables, cell_context(bitmap, row, col), bitmap[row, col])
+    shape = cell_normals(bitmap, 1.0, reach)
+    k = -1
     for row in range(2, rows - 2):
         for col in range(2, cols - 2):
-            if not bitmap[row, col]:
+            k += bitmap[row, col]
+            if not bitmap[row, col] or shape[k, 4] < STRAIGHT:
                 continue
             base = BITMAP_CONTEXTS + 8 * level_context(bitmap, levels, row, col)
             value = levels[row, col] + LEVELS // 2
@@ -139,7 +143,7 @@ def encode(bitmap: Bits, levels: Levels) -> Bits:
 
 
 @njit(nogil=True, cache=True)
-def decode(data: Bits, bitmap: Bits, levels: Levels) -> None:
+def decode(data: Bits, bitmap: Bits, levels: Levels, reach: int) -> None:
     """Fill bitmap and levels (both zero before) from coded data. Any data decodes to something."""
     rows, cols = bitmap.shape
     state = np.array([0, 0xFFFFFFFF, 4, 0], np.int64)
@@ -149,9 +153,12 @@ def decode(data: Bits, bitmap: Bits, levels: Levels) -> None:
     for row in range(2, rows - 2):
         for col in range(2, cols - 2):
             bitmap[row, col] = get_bit(state, data, tables, cell_context(bitmap, row, col))
+    shape = cell_normals(bitmap, 1.0, reach)
+    k = -1
     for row in range(2, rows - 2):
         for col in range(2, cols - 2):
-            if not bitmap[row, col]:
+            k += bitmap[row, col]
+            if not bitmap[row, col] or shape[k, 4] < STRAIGHT:
                 continue
             base = BITMAP_CONTEXTS + 8 * level_context(bitmap, levels, row, col)
             node = 1
