@@ -14,6 +14,7 @@ import typer
 from drivers.errors import DriverError
 from lemtomap.errors import LemtomapError
 from robot import cli_drive, cli_map
+from sim.errors import SimError
 
 DEBUG_VARIABLE = "LEMTOMAP_DEBUG"  # set: show the traceback of an unexpected error
 
@@ -53,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     except typer.TyperException as error:
         return _usage(error)
-    except (LemtomapError, DriverError) as error:
+    except (LemtomapError, DriverError, SimError) as error:
         return _fail(2, str(error))
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""

@@ -8,6 +8,7 @@ last line is the truth of the run: {"path_m": ..., "contacts": ..., "contact_s":
 
 import argparse
 import json
+import os
 import select
 import signal
 import sys
@@ -109,9 +110,20 @@ def _forward(port: HostPort, data: bytes) -> None:
         return  # bytes written to a pulled cable are lost
 
 
-def serve_world(world: str, seed: int, *, duration_s: float, truth_path: Path | None, gui: bool) -> None:
-    """Serve one world until SIGINT, SIGTERM or the end of the time. Raises BadWorld."""
+def _stop_without(parent: int, stop: threading.Event) -> None:
+    """End the serving when the process that started it is gone."""
+    while not stop.wait(0.5):
+        if os.getppid() != parent:
+            stop.set()
+
+
+def serve_world(
+    world: str, seed: int, *, duration_s: float, truth_path: Path | None, gui: bool, parent: int | None = None
+) -> None:
+    """Serve one world until a signal, the end of the time or of the parent process. Raises BadWorld."""
     stop = threading.Event()
+    if parent is not None:
+        threading.Thread(target=_stop_without, args=(parent, stop), daemon=True).start()
 
     def on_signal(_number: int, _frame: FrameType | None) -> None:
         stop.set()
@@ -161,6 +173,7 @@ def main() -> int:
     )
     parser.add_argument("--truth", type=Path, default=None, help="write the true poses to this file, 10 Hz")
     parser.add_argument("--gui", action="store_true", help="open pybullet's window")
+    parser.add_argument("--parent", type=int, default=None, help="end when this parent process is gone")
     arguments = parser.parse_args()
     try:
         serve_world(
@@ -169,6 +182,7 @@ def main() -> int:
             duration_s=arguments.duration,
             truth_path=arguments.truth,
             gui=arguments.gui,
+            parent=arguments.parent,
         )
     except BadWorld as error:
         sys.stderr.write(f"{error}\n")

@@ -1,0 +1,95 @@
+"""`lemtomap sim`: the whole robot in a simulated building, in lock-step or in real time."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drivers.port import open_serial
+from robot.config import RobotConfig
+from robot.display import has_display
+from robot.exchange import Ended, MissionState
+from robot.lockstep import run_lockstep
+from robot.missions import parse_mission
+from robot.progress import Bar
+from robot.run import Run, RunPlan, Teller
+from robot.runtime import Ports, Runtime
+from robot.sim_server import FakeHardware
+from robot.warmup import warm_up
+from sim import worlds
+from sim.simulator import Simulator
+
+LOOK_PERIOD_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class SimOptions:
+    """What the user asked for."""
+
+    world: str
+    mission: str
+    duration_s: float
+    out: Path
+    seed: int = 0
+    slam: str = "rolling"
+    fast: bool = False
+    live: bool = True
+
+
+def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
+    """Run until the mission is over or the time is up; return the summary. Raises BadWorld, BadSetting."""
+    worlds.load(options.world)
+    parse_mission(options.mission)
+    plan = RunPlan(
+        out=options.out,
+        map_path=options.out / "map.lemto",
+        title=f"{Path(options.world).stem}: {options.mission}",
+        seed=options.seed,
+        slam=options.slam,
+        config=RobotConfig(),
+        live=options.live and has_display(),
+        replace=True,
+        facts={"world": options.world, "mission": options.mission},
+    )
+    with Run(plan, Teller(bar, options.duration_s)) as run:
+        drive = _drive_fast if options.fast else _drive_in_real_time
+        drive(options, run)
+    return run.summary
+
+
+def _drive_fast(options: SimOptions, run: Run) -> None:
+    """Run in lock-step on a virtual clock."""
+    simulator = Simulator(worlds.load(options.world), options.seed)
+    look_at_s = 0.0
+
+    def watch(now_s: float) -> None:
+        nonlocal look_at_s
+        if now_s >= look_at_s:
+            look_at_s = now_s + LOOK_PERIOD_S
+            run.files.look(now_s)
+
+    try:
+        mission = parse_mission(options.mission)
+        ended = run_lockstep(simulator, run.core, mission, options.duration_s, run.files.raw.put, watch)
+        run.end(ended, _truth(simulator))
+    except KeyboardInterrupt:
+        run.end(Ended(simulator.now_s, MissionState.FAILED, "interrupted"), _truth(simulator))
+    finally:
+        simulator.close()
+
+
+def _truth(simulator: Simulator) -> dict[str, Any]:
+    """Return what only the simulator knows of how it went."""
+    truth = simulator.truth()
+    return {"contacts": truth.contact_count, "contact_s": truth.contact_s, "true_path_m": truth.path_m}
+
+
+def _drive_in_real_time(options: SimOptions, run: Run) -> None:
+    """Run on the wall clock, the simulator in a process of its own behind pseudo-terminals."""
+    warm_up(run.plan.config, options.slam)
+    with FakeHardware(options.world, options.seed) as hardware:
+        ports = Ports(lambda: open_serial(hardware.kobuki), lambda: open_serial(hardware.hokuyo))
+        runtime = Runtime(run.core, ports, run.files)
+        ended = runtime.run(parse_mission(options.mission), options.duration_s)
+    truth = hardware.truth
+    told = {key: truth[key] for key in ("contacts", "contact_s") if key in truth}
+    run.end(ended, told | ({"true_path_m": truth["path_m"]} if truth else {}))

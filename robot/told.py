@@ -1,0 +1,37 @@
+"""What the user reads when a run is over."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from robot.display import has_display
+from robot.view import how_to_look
+
+
+def told_after_run(out: Path, summary: Mapping[str, Any]) -> str:
+    """Return a few lines: how it went, what it cost, where the results are and how to look at them."""
+    lines = [_verdict(summary)]
+    if "nodes" in summary:
+        contacts = f", {summary['contacts']} contacts" if "contacts" in summary else ""
+        lines.append(
+            f"{summary['path_m']:.0f} m driven in {summary['run_s']:.0f} s "
+            f"({summary['realtime_factor']:.1f}x real time){contacts}; "
+            f"{summary['nodes']} nodes, {summary['loop_closures']} loop closures, "
+            f"{summary['map_bytes'] / 1000:.0f} kB of map"
+        )
+        lines.append(f"picture    {out / 'overview.png'}")
+        lines.append(f"map        {out / 'map.lemto'}")
+    recording = out / "run.rrd"
+    if has_display():
+        lines.append(f"recording  {recording}   (again: lemtomap view {out})")
+    else:
+        lines.append(f"recording  {recording}")
+        lines.append(how_to_look(recording))
+    return "\n".join(lines)
+
+
+def _verdict(summary: Mapping[str, Any]) -> str:
+    """Return how the mission ended, in a line."""
+    if summary["result"] == "running":
+        return f"stopped after {summary['run_s']:.0f} s, while: {summary['result_text']}"
+    return ": ".join(part for part in (summary["result"], summary["result_text"]) if part)
