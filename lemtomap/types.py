@@ -4,6 +4,7 @@ Frames: `base` (robot, x forward, y left), `laser`, `odom` (continuous, drifts),
 window's frame), `node/<id>` (each topological node owns one). There is no world frame.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -38,6 +39,9 @@ class Scan:
     time_step_s: float = 0.0
     range_min_m: float = 0.02
     range_max_m: float = 5.6
+    silent_free_m: float = math.inf
+    """A beam that saw nothing (+inf) proves free space only so far: a URG-04LX overlooks dark and slanting
+    surfaces much nearer than its range."""
     T_base_laser: Pose = field(default_factory=lambda: np.zeros(3))
 
 

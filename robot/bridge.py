@@ -18,6 +18,8 @@ from robot.safety import Sides
 # Kobuki's sensors on its rim (reference, section 14): cliffs at 57 degrees, side bumpers at 60.
 BUMPER_BEARING_RAD = {Bumper.LEFT: math.radians(60), Bumper.CENTER: 0.0, Bumper.RIGHT: math.radians(-60)}
 CLIFF_BEARING_RAD = {Cliff.LEFT: math.radians(57), Cliff.CENTER: 0.0, Cliff.RIGHT: math.radians(-58)}
+URG_SILENT_FREE_M = 2.0  # walls of an office at a grazing angle return nothing from 2 to 3 m on
+FAR_SENSOR_M = 20.0  # UTM-30LX and its kin do see walls, and say so when there is none
 
 
 def sides_of_bumper(flags: Bumper) -> Sides:
@@ -66,7 +68,7 @@ def deskewed_sighting(scan: Scan, T_odom_base_beams: Pose) -> nav.Sighting:
         stamp_s=scan.stamp_s,
         T_odom_base=T_odom_base_beams[0],
         hits_base=ends(hit, ranges[hit]),
-        misses_base=ends(miss, scan.range_max_m),
+        misses_base=ends(miss, min(scan.range_max_m, scan.silent_free_m)),
         origin_base=origin,
     )
 
@@ -81,6 +83,7 @@ def scan_of(seen: LaserScan, T_base_laser: Pose) -> Scan:
         time_step_s=seen.time_step_s,
         range_min_m=seen.range_min_m,
         range_max_m=seen.range_max_m,
+        silent_free_m=URG_SILENT_FREE_M if seen.range_max_m < FAR_SENSOR_M else math.inf,
         T_base_laser=T_base_laser,
     )
 

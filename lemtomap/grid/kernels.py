@@ -32,14 +32,15 @@ def prepare_scan(
     directions: Array,
     T_base_laser: Array,
     motion: tuple[float, float, float],
-    limits: tuple[float, float],
+    limits: tuple[float, float, float],
     hits: Array,
     cuts: Array,
 ) -> tuple[int, int]:
     """Turn beams into points in base at the first beam's time; return (number of hits, number of cuts).
 
-    motion: v m/s, w rad/s, s between beams. limits: least range, usable range; a beam that goes beyond the
-    usable range is cut there and proves only free space. directions, hits, cuts: (N, 2).
+    motion: v m/s, w rad/s, s between beams. limits: least range, usable range, and how far a beam that met
+    nothing (+inf) proves free space; a beam that goes beyond the usable range is cut there.
+    directions, hits, cuts: (N, 2).
     """
     cos_l, sin_l = math.cos(T_base_laser[2]), math.sin(T_base_laser[2])
     v, w, time_step = motion[0], motion[1], motion[2]
@@ -51,7 +52,7 @@ def prepare_scan(
             continue
         is_hit = r < limits[1]
         if not is_hit:
-            r = limits[1]
+            r = min(limits[1], limits[2]) if math.isinf(r) else limits[1]
         lx, ly = r * directions[i, 0], r * directions[i, 1]
         x = T_base_laser[0] + cos_l * lx - sin_l * ly
         y = T_base_laser[1] + sin_l * lx + cos_l * ly

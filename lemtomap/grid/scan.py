@@ -44,7 +44,7 @@ class ScanPreparer:
             self._directions,
             scan.T_base_laser,
             (odometry.v_mps, odometry.w_radps, scan.time_step_s),
-            (scan.range_min_m, math.nextafter(usable_range_m, math.inf)),
+            (scan.range_min_m, math.nextafter(usable_range_m, math.inf), scan.silent_free_m),
             points[0],
             points[1],
         )

@@ -103,7 +103,7 @@ class Sighting:
             stamp_s=scan.stamp_s,
             T_odom_base=T_odom_base,
             hits_base=origin + directions[hit] * ranges[hit, None],
-            misses_base=origin + directions[miss] * scan.range_max_m,
+            misses_base=origin + directions[miss] * min(scan.range_max_m, scan.silent_free_m),
             origin_base=(float(origin[0]), float(origin[1])),
             source=source,
         )

@@ -1,0 +1,181 @@
+"""The whole graph in flat arrays, for planning across maps of a million nodes.
+
+IDs are dense and never reused, so they serve as indices; edges can be added and re-priced in place. A plan
+is a tree of best ways towards the goal; when a way proves closed, an A* search led by that tree finds the
+next best.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.errors import NoRoute
+from lemtomap.nav.config import RouteConfig
+from lemtomap.nav.route import kernels
+from lemtomap.nav.route.planner import Route
+from lemtomap.types import RouteEdge
+
+Column = NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeTable:
+    """Edges in columns of equal length."""
+
+    edge_id: NDArray[np.int64]
+    source_id: NDArray[np.int64]
+    target_id: NDArray[np.int64]
+    length_m: NDArray[np.float32]
+    time_s: NDArray[np.float32]
+    blocked_until_s: NDArray[np.float64]
+
+
+class RouteNetwork:
+    """Plans over an EdgeTable; owned by the navigation thread."""
+
+    def __init__(self, edges: EdgeTable, config: RouteConfig) -> None:
+        self._config = config
+        nodes = int(max(edges.source_id.max(initial=0), edges.target_id.max(initial=0))) + 1
+        count = int(edges.edge_id.max(initial=0)) + 1
+        self._first_arc = np.full(_room(nodes), -1, dtype=np.int32)
+        self._next_arc = np.full(2 * _room(count), -1, dtype=np.int32)
+        self._arc_to = np.full(2 * _room(count), -1, dtype=np.int32)
+        self._length_m = np.zeros(_room(count), dtype=np.float32)
+        self._time_s = np.zeros(_room(count), dtype=np.float32)
+        self._open_price = np.full(_room(count), np.inf, dtype=np.float32)
+        self._blocked_s = np.zeros(_room(count))
+        self._price = np.empty(0, dtype=np.float32)
+        self._goal_id = -1
+        self._to_go = np.empty(0, dtype=np.float32)
+        self._via = np.empty(0, dtype=np.int32)
+        self._final_s = 0.0
+        self.put(edges)
+
+    def put(self, edges: EdgeTable) -> None:
+        """Add new edges and take over new times and blockings of known ones."""
+        ids = edges.edge_id
+        self._make_room(
+            int(max(edges.source_id.max(initial=0), edges.target_id.max(initial=0))), int(ids.max(initial=0))
+        )
+        new = np.isinf(self._open_price[ids])
+        price = self._config.learnt_weight * edges.time_s + (1.0 - self._config.learnt_weight) * (
+            edges.length_m / self._config.usual_speed_mps
+        )
+        self._length_m[ids], self._time_s[ids] = edges.length_m, edges.time_s
+        self._open_price[ids], self._blocked_s[ids] = np.maximum(price, 1e-3), edges.blocked_until_s
+        kernels.chain_arcs(
+            edges.source_id[new].astype(np.int32),
+            edges.target_id[new].astype(np.int32),
+            ids[new].astype(np.int32),
+            self._first_arc,
+            self._next_arc,
+            self._arc_to,
+        )
+        self._goal_id = -1  # something may have become cheaper
+
+    def plan(
+        self, start_id: int, goal_id: int, now_s: float, closed_until_s: Mapping[int, float] | None = None
+    ) -> Route:
+        """Return the cheapest open route. Raises NoRoute with the reason.
+
+        The first plan to a goal costs a search of the map; later ones, from elsewhere or around edges closed
+        since, only a look at the nodes of the detour.
+        """
+        for node_id, role in ((start_id, "start"), (goal_id, "goal")):
+            if not 0 <= node_id < self._first_arc.size or (
+                self._first_arc[node_id] < 0 and start_id != goal_id
+            ):
+                raise NoRoute(f"{role} node {node_id} is not in the map")
+        if start_id == goal_id:
+            return Route((start_id,), (), 0.0)
+        price = self._prices(now_s, closed_until_s or {})
+        if goal_id != self._goal_id or bool((price < self._price).any()):
+            return self._plan_anew(start_id, goal_id, price)
+        self._price = price
+        return self._plan_around(start_id, goal_id, price)
+
+    def _prices(self, now_s: float, closed_until_s: Mapping[int, float]) -> NDArray[np.float32]:
+        price = np.where(self._blocked_s > now_s, np.float32(np.inf), self._open_price)
+        for edge_id, until_s in closed_until_s.items():
+            if until_s > now_s and edge_id < price.size:
+                price[edge_id] = np.inf
+        return price
+
+    def _plan_anew(self, start_id: int, goal_id: int, price: NDArray[np.float32]) -> Route:
+        self._to_go = np.full(self._first_arc.size, np.inf, dtype=np.float32)
+        self._via = np.full(self._first_arc.size, -1, dtype=np.int32)
+        self._goal_id, self._price = goal_id, price
+        self._final_s = kernels.way_to_goal(
+            self._first_arc, self._next_arc, self._arc_to, price, goal_id, start_id,
+            self._config.bucket_s, self._to_go, self._via,
+        )  # fmt: skip
+        if not np.isfinite(self._to_go[start_id]):
+            self._goal_id = -1
+            raise self._no_route(start_id, goal_id, price)
+        arcs, node_id = [], start_id
+        while node_id != goal_id:
+            arcs.append(int(self._via[node_id]))
+            node_id = int(self._arc_to[arcs[-1]])
+        return self._route(start_id, arcs, float(self._to_go[start_id]))
+
+    def _plan_around(self, start_id: int, goal_id: int, price: NDArray[np.float32]) -> Route:
+        size = self._first_arc.size
+        reached = np.full(size, np.inf, dtype=np.float32)
+        came = np.empty(size, dtype=np.int32)
+        touched = np.empty(size, dtype=np.int32)
+        count = kernels.guided_way(
+            self._first_arc, self._next_arc, self._arc_to, price, start_id, goal_id,
+            self._to_go, self._final_s, reached, came, touched,
+        )  # fmt: skip
+        if count < 0:
+            raise self._no_route(start_id, goal_id, price)
+        arcs, node_id = [], goal_id
+        while node_id != start_id:
+            arcs.append(int(came[node_id]))
+            node_id = int(self._arc_to[arcs[-1] ^ 1])
+        return self._route(start_id, arcs[::-1], float(reached[goal_id]))
+
+    def _route(self, start_id: int, arcs: list[int], cost_s: float) -> Route:
+        nodes = (start_id, *(int(self._arc_to[arc]) for arc in arcs))
+        edges = tuple(
+            RouteEdge(
+                arc >> 1,
+                int(self._arc_to[arc]),
+                float(self._length_m[arc >> 1]),
+                float(self._time_s[arc >> 1]),
+                float(self._blocked_s[arc >> 1]),
+            )
+            for arc in arcs
+        )
+        return Route(nodes, edges, cost_s)
+
+    def _no_route(self, start_id: int, goal_id: int, price: NDArray[np.float32]) -> NoRoute:
+        shut = int((np.isinf(price) & np.isfinite(self._open_price)).sum())
+        if shut:
+            return NoRoute(f"every way from node {start_id} to {goal_id} is closed ({shut} edges blocked)")
+        return NoRoute(f"nodes {start_id} and {goal_id} are not connected")
+
+    def _make_room(self, node_id: int, edge_id: int) -> None:
+        if node_id >= self._first_arc.size:
+            self._first_arc = _grown(self._first_arc, _room(node_id + 1), -1)
+        if edge_id >= self._length_m.size:
+            size = _room(edge_id + 1)
+            self._next_arc = _grown(self._next_arc, 2 * size, -1)
+            self._arc_to = _grown(self._arc_to, 2 * size, -1)
+            self._length_m = _grown(self._length_m, size, 0.0)
+            self._time_s = _grown(self._time_s, size, 0.0)
+            self._open_price = _grown(self._open_price, size, np.inf)
+            self._blocked_s = _grown(self._blocked_s, size, 0.0)
+
+
+def _room(count: int) -> int:
+    return count + count // 8 + 64
+
+
+def _grown(array: Column, size: int, fill: float) -> Column:
+    out = np.full(size, fill, dtype=array.dtype)
+    out[: array.size] = array
+    return out
