@@ -42,8 +42,6 @@ class NavigationStep:
             return
         if self._graph is None:
             self._graph = self._open_graph()
-        if not self._graph.has_node(view.associated_id):
-            return  # the mapper's first transaction is still open
         output = self.navigator.step(
             view,
             self._graph,

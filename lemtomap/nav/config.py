@@ -110,6 +110,7 @@ class ExploreConfig:
     least_depth_m: float = 0.20  # dark seams less than twice this deep are gaps between beams
     goal_tolerance_m: float = 0.40
     switch_share: float = 0.5  # another opening must cost less than this share of the present one's
+    here_price_m: float = 3.0  # an opening beside the robot will mostly be seen in passing
     turn_price_m: float = 1.0  # turning right round costs about this much way
     window_first_m: float = 6.0  # look for openings beyond the window when none in it is nearer than this
     patience_s: float = 240.0

@@ -213,6 +213,8 @@ class Explorer:
             return None
         way_m = float(field_cells[found[0], found[1]]) * reach.costs.resolution_m
         dx, dy = place - T_grid_base[:2]
+        if np.hypot(dx, dy) <= self.config.goal_tolerance_m:
+            way_m += self.config.here_price_m
         turn_rad = abs(float(se2.wrap_angle(np.arctan2(dy, dx) - T_grid_base[2])))
         return way_m + self.config.turn_price_m * turn_rad / np.pi if np.isfinite(way_m) else None
 
