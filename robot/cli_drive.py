@@ -8,16 +8,26 @@ import typer
 
 from robot.cli_help import add
 
+MISSIONS = "explore, tour, goto:PLACE (a node's number, its name, far, start), several joined by commas"
+
 
 def register(app: typer.Typer) -> None:
     """Add this module's commands to the program, in the order of the help page."""
     add(
         app,
         sim,
-        "lemtomap sim                                        explore the office, go to its far end and back",
+        "lemtomap sim                                        explore the office, drive to its far end",
         "lemtomap sim --fast --mission goto:12               lock-step: faster, and the same every time",
         "lemtomap sim --world plan.yaml --duration 600       any ROS map_server floor plan",
         "lemtomap sim --serve                                only the fake hardware, on two pseudo-terminals",
+    )
+    add(
+        app,
+        run,
+        "lemtomap run                                        explore with the robot found on USB",
+        "lemtomap run --map office.lemto                     go on with a map, or begin it",
+        "lemtomap run --map office.lemto --mission goto:kitchen",
+        "lemtomap run --kobuki /dev/pts/3 --hokuyo /dev/pts/4    the ports of 'lemtomap sim --serve'",
     )
     add(
         app,
@@ -34,10 +44,7 @@ def sim(
     ] = "office",
     mission: Annotated[
         str,
-        typer.Option(
-            metavar="WHAT",
-            help="explore, tour, goto:PLACE (a node's number or name), several joined by commas",
-        ),
+        typer.Option(metavar="WHAT", help=MISSIONS),
     ] = "explore,goto:far,goto:start",
     duration: Annotated[
         float, typer.Option(metavar="S", min=1.0, help="end at the latest after this many seconds")
@@ -65,6 +72,42 @@ def sim(
     with progress_bar(f"sim {world}") as bar:
         summary = run_sim(options, bar)
     typer.echo(told_after_run(out, summary))
+    raise typer.Exit(summary["result"] == "failed")
+
+
+def run(
+    *,
+    kobuki: Annotated[
+        str | None, typer.Option(metavar="PORT", help="the base; default: found by USB identity")
+    ] = None,
+    hokuyo: Annotated[
+        str | None, typer.Option(metavar="PORT", help="the laser; default: found by USB identity")
+    ] = None,
+    map_file: Annotated[
+        Path | None, typer.Option("--map", metavar="FILE.lemto", help="map to go on with, or to make")
+    ] = None,
+    mission: Annotated[str, typer.Option(metavar="WHAT", help=MISSIONS)] = "explore",
+    duration: Annotated[
+        float, typer.Option(metavar="S", min=1.0, help="end at the latest after this many seconds")
+    ] = 1e6,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="folder for the results; default runs/DATE_TIME")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="settings that differ from the defaults")
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="of the particles")] = 0,
+) -> None:
+    """Run the real robot: map, explore, drive to places. Ctrl-C stops it and writes the results."""
+    from robot.progress import progress_bar
+    from robot.robot_run import RobotOptions, run_robot
+    from robot.told import told_after_run
+
+    options = RobotOptions(mission, duration, kobuki, hokuyo, map_file, out, config, seed)
+    with progress_bar("run") as bar:
+        folder, summary = run_robot(options, bar)
+    typer.echo(told_after_run(folder, summary))
+    raise typer.Exit(summary["result"] == "failed")
 
 
 def view(
