@@ -64,6 +64,9 @@ class KobukiSample:
     """Running number (mod 256) of the first raw gyro sample."""
     inputs: Inputs | None
 
+    on_dock: bool = False
+    """What the charger's byte says of this very packet; `battery.source` is debounced."""
+
     @property
     def contact(self) -> bool:
         """Tell whether anything asks the robot to stop at once."""

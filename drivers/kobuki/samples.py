@@ -21,6 +21,7 @@ from drivers.kobuki.packets import (
     RAW_GYRO_DPS_PER_DIGIT,
     Bumper,
     Button,
+    Charge,
     Cliff,
     CliffAdc,
     DockingIr,
@@ -71,6 +72,7 @@ def sample_of(frame: Feedback, stamp_s: float, arrival_s: float, battery: Batter
         raw_gyro_radps=raw_gyro_in_base_axes(gyro),
         raw_gyro_id=gyro.frame_id,
         inputs=frame.inputs,
+        on_dock=basic.charger in {Charge.CHARGED, Charge.CHARGING},
     )
 
 
