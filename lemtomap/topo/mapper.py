@@ -318,6 +318,16 @@ class TopoMapper:
         self.local.release_matched()
         self.local.settle(self._associated_id)
 
+    def change_level(self, level: int) -> int:
+        """Say that the robot is on another level now (a lift, the end of a ramp); returns its first node.
+
+        The odometry edge to it is the lift or ramp; near-neighbour edges join one level only.
+        """
+        if level != self.level:
+            self.level = level
+            self._create()
+        return self._associated_id
+
     def start_component(self) -> int:
         """Start a new part of the graph here, joined to nothing yet (carried elsewhere); returns its node."""
         self.local.standings.clear()

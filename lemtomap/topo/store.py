@@ -14,7 +14,7 @@ from typing import Any, Self
 
 from lemtomap.errors import BadMap
 from lemtomap.topo import schema
-from lemtomap.topo.graph import Edge, Mark, Node, Place, Placeholder
+from lemtomap.topo.graph import Area, Edge, Mark, Node, Place, Placeholder
 from lemtomap.topo.rows import (
     EDGE_COLUMNS,
     NODE_COLUMNS,
@@ -36,6 +36,7 @@ class TopoStore:
         self.path = path
         self.commit_every_s = commit_every_s
         self._db = connection
+        self._closed = False
         self._begun_s: float | None = None
         self._stamp_s = 0.0
         self._next_node = self._next_id("node")
@@ -104,10 +105,9 @@ class TopoStore:
 
     def close(self) -> None:
         """Commit, fold the write-ahead log into the one file, close. May be called again."""
-        with contextlib.suppress(sqlite3.ProgrammingError):
-            self._close()
-
-    def _close(self) -> None:
+        if self._closed:
+            return
+        self._closed = True
         try:
             self._write("DELETE FROM change WHERE version < ?", (self.version,))
             self.commit()
@@ -269,6 +269,16 @@ class TopoStore:
     def set_name(self, name: str, node_id: int) -> None:
         """Give a node a name; a name belongs to one node."""
         self._write("REPLACE INTO name(name, node) VALUES(?, ?)", (name, node_id))
+
+    def areas(self) -> dict[int, Area]:
+        """Return all areas that were described."""
+        rows = self.query("SELECT id, name, kind, tags FROM area ORDER BY id")
+        return {row[0]: Area(row[0], row[1], row[2], tuple(row[3].split())) for row in rows}
+
+    def put_area(self, area: Area) -> None:
+        """Describe an area."""
+        values = (area.area_id, area.name, area.kind, " ".join(area.tags))
+        self._write("REPLACE INTO area(id, name, kind, tags) VALUES(?, ?, ?, ?)", values)
 
     def add_placeholder(self, opening: Placeholder) -> Placeholder:
         """Write an unexplored opening; returns it with its ID."""
