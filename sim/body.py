@@ -28,11 +28,13 @@ class BodyConfig:
     """Time constant of the speed loop (guess from the response of a loaded 24:1 gear motor with PID)."""
     max_accel_mps2: float = 1.8
     """What the motors can do with 6 kg on top."""
-    wheel_radius_sigma: float = 0.004
-    """Relative error of each wheel's radius: wear and tyre compression."""
+    wheel_radius_sigma: float = 0.008
+    """Relative error common to both wheels' radius: wear and compression of the tyres."""
+    wheel_difference_sigma: float = 0.0015
+    """Relative error of one wheel's radius against the other's."""
     track_sigma: float = 0.006
     """Relative error of the distance between the wheels' contact points."""
-    slip_sigma: float = 0.010
+    slip_sigma: float = 0.006
     """Standard deviation of the slowly varying relative slip of each wheel."""
     slip_length_m: float = 1.0
     """Distance over which the slip forgets itself (floor joints, dust, carpet)."""
@@ -95,8 +97,9 @@ class Body:
         self._rng = rng
         self._flat = flat
         draw = rng.standard_normal(3)
-        self._left_scale = 1.0 + config.wheel_radius_sigma * float(draw[0])
-        self._right_scale = 1.0 + config.wheel_radius_sigma * float(draw[1])
+        common = 1.0 + config.wheel_radius_sigma * float(draw[0])
+        self._left_scale = common - config.wheel_difference_sigma * float(draw[1]) / 2
+        self._right_scale = common + config.wheel_difference_sigma * float(draw[1]) / 2
         self._track_m = 2 * HALF_TRACK_M * (1.0 + config.track_sigma * float(draw[2]))
         self._slip = [0.0, 0.0]
         self.state = BodyState(*spawn)

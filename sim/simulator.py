@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.base import BIT_RATE, Base, BaseConfig
+from sim.body import BodyState
 from sim.hokuyo import HokuyoConfig, HokuyoFirmware
 from sim.link import HostPort, Link, LinkFaults
 from sim.scene import Scene
@@ -124,6 +125,10 @@ class Simulator:
             touching=bool(body.contacts),
             room=self.world.truth.room_at(x, y, self.world.level_at(body.state.height_m)),
         )
+
+    def perfect_scan_m(self, state: BodyState) -> NDArray[np.float64]:
+        """Return what a laser without noise would see from a place, float64 (682,), +inf beyond reach."""
+        return self._urg.true_ranges_m(state)
 
     def _tick(self) -> None:
         begin, end = self._ticks * STEP_S, (self._ticks + 1) * STEP_S

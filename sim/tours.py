@@ -34,23 +34,24 @@ class Tour:
     """Follows one path: `command(pose)` gives (v, w) until `done`."""
 
     def __init__(self, path: NDArray[np.float64], config: TourConfig | None = None) -> None:
-        self._path = path
-        self._config = config or TourConfig()
+        self.path = path
+        """float64 (N, 2), metres."""
+        self.config = config or TourConfig()
         self._at = 0
 
     @property
     def done(self) -> bool:
         """Whether the end of the path is reached."""
-        return self._at >= len(self._path) - 1
+        return self._at >= len(self.path) - 1
 
     @property
     def length_m(self) -> float:
         """Length of the whole path."""
-        return float(np.hypot(*np.diff(self._path, axis=0).T).sum())
+        return float(np.hypot(*np.diff(self.path, axis=0).T).sum())
 
     def command(self, pose: NDArray[np.float64]) -> tuple[float, float]:
         """Return (v m/s, w rad/s) that leads from a true pose along the path (pure pursuit)."""
-        config = self._config
+        config = self.config
         x, y, yaw = pose
         self._at = self._nearest(x, y)
         if self.done:
@@ -65,14 +66,14 @@ class Tour:
 
     def _nearest(self, x: float, y: float) -> int:
         """Return the nearest path point among the next ones: a path may cross itself."""
-        window = self._path[self._at : self._at + 12]
+        window = self.path[self._at : self._at + 12]
         return self._at + int(np.argmin((window[:, 0] - x) ** 2 + (window[:, 1] - y) ** 2))
 
     def _ahead(self, x: float, y: float) -> tuple[float, float]:
-        for px, py in self._path[self._at :]:
-            if math.hypot(px - x, py - y) >= self._config.look_ahead_m:
+        for px, py in self.path[self._at :]:
+            if math.hypot(px - x, py - y) >= self.config.look_ahead_m:
                 return float(px), float(py)
-        return float(self._path[-1, 0]), float(self._path[-1, 1])
+        return float(self.path[-1, 0]), float(self.path[-1, 1])
 
 
 def plan_tour(world: World, duration_s: float, config: TourConfig | None = None, seed: int = 0) -> Tour:
@@ -134,9 +135,14 @@ def _int16(value: float) -> int:
     return max(-32768, min(32767, int(value)))
 
 
-def drive(simulator: Simulator, tour: Tour, limit_s: float = float("inf")) -> Iterator[float]:
-    """Drive a tour to its end in lock-step, yielding the time every 20 ms; commands go through the port."""
+def drive(simulator: Simulator, tour: Tour, limit_s: float | None = None) -> Iterator[float]:
+    """Drive a tour to its end in lock-step, yielding the time every 20 ms; commands go through the port.
+
+    A drive that something holds up for good ends at the limit, by default four times the time it should take.
+    """
     begin_s = simulator.now_s
+    if limit_s is None:
+        limit_s = 60.0 + 4.0 * tour.length_m / tour.config.speed_mps
     while not tour.done and simulator.now_s - begin_s < limit_s:
         v, w = tour.command(simulator.truth().T_world_base)
         simulator.kobuki.write(base_command(v, w))

@@ -1,18 +1,14 @@
-"""The URG-04LX-UG01's optics: a mirror that turns while the robot drives, and what comes back of its light.
-
-The range error follows the data sheet (+-30 mm to 1 m, +-3 % above, taken as three standard deviations)
-and is split: one part stays with each patch of surface (its colour shifts the phase measurement), the rest is
-new every time. What returns nothing is decided by light: albedo, angle of incidence and distance.
-"""
+"""The URG-04LX-UG01 on the robot: a mirror that turns while the robot drives, beam after beam."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.body import BodyState
 from sim.hokuyo import FIRST_STEP, FRONT_STEP, LAST_STEP, NOT_MEASURABLE, SLITS, STEPS
+from sim.optics import NOTHING, WEAK, Light, OpticsConfig, measure
 from sim.scene import Scene
 from sim.world import Pose2
 
@@ -20,8 +16,6 @@ BEAMS = LAST_STEP - FIRST_STEP + 1
 ANGLES_RAD: NDArray[np.float64] = np.array(
     [(step - FRONT_STEP) * 2 * math.pi / SLITS for step in range(FIRST_STEP, LAST_STEP + 1)]
 )
-NOTHING, WEAK, OTHER, NEIGHBOUR, TWO_WAVES = 0, 1, 6, 7, 8
-"""Error codes (section 7.1)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,26 +25,7 @@ class UrgConfig:
     T_base_laser: Pose2 = (0.0, 0.0, 0.0)
     height_m: float = 0.25
     """Above the floor: on the TurtleBot's second plate."""
-    max_m: float = 5.6
-    """DMAX of the sensor."""
-    reach_m: float = 6.4
-    """How far a white wall, square to the beam, still gives an answer; from the shares of exp1.dat."""
-    near_sigma_m: float = 0.010
-    """A third of +-30 mm."""
-    far_sigma: float = 0.010
-    """A third of +-3 %."""
-    patch_share: float = 0.8
-    """Share of the standard deviation that belongs to the patch of surface (repeatability is far better
-    than accuracy: 3 to 10 mm on a standing exp1.dat)."""
-    patch_m: float = 0.25
-    albedo_spread: float = 0.5
-    """Paint differs: a patch gives back between (1 - spread) and 1 of its surface's albedo."""
-    footprint_m: float = 0.15
-    """A jump in range between two neighbours beyond this is an edge, where one beam meets two surfaces."""
-    edge_mixed: float = 0.15
-    """Chance that an edge beam gives a value in between."""
-    edge_error: float = 0.25
-    """Chance that an edge beam gives an error code."""
+    optics: OpticsConfig = field(default_factory=OpticsConfig)
     motor_sigma: float = 0.002
     """Relative error of the motor's speed (exp1.dat turns about one percent fast)."""
     blocked: tuple[float, float] | None = None
@@ -73,7 +48,7 @@ class Urg:
         self._range_m = np.zeros(BEAMS)
         self._cos = np.zeros(BEAMS)
         self._albedo = np.zeros(BEAMS)
-        self._patch = np.zeros((BEAMS, 2))
+        self._points = np.zeros((BEAMS, 2))
 
     @property
     def started_s(self) -> float:
@@ -124,62 +99,28 @@ class Urg:
         directions[:, 1] = np.sin(yaw + angle)
         directions[:, 2] = np.cos(angle) * math.tan(after.pitch) + np.sin(angle) * math.tan(after.roll)
         directions /= np.linalg.norm(directions, axis=1)[:, None]
-        ends = starts + directions * config.max_m
-        hits = self._scene.cast(starts, ends)
-        self._range_m[beams] = np.where(hits.body >= 0, hits.share * config.max_m, np.inf)
+        reach_m = config.optics.max_m
+        hits = self._scene.cast(starts, starts + directions * reach_m)
+        length = hits.share * reach_m
+        self._range_m[beams] = np.where(hits.body >= 0, length, np.inf)
         self._cos[beams] = np.abs((hits.normal * directions).sum(axis=1))
         self._albedo[beams] = self._scene.albedo[hits.body]
-        self._patch[beams] = np.floor(
-            (starts + directions * (hits.share * config.max_m)[:, None]) / config.patch_m
-        )[:, :2]
+        self._points[beams] = starts[:, :2] + directions[:, :2] * length[:, None]
 
     def _measure(self) -> NDArray[np.int64]:
-        """Return what the electronics make of one turn."""
-        config, rng = self._config, self._rng
+        """Return one turn by step, int64 (769,), mm or error codes."""
+        blocked = self._config.blocked
         scan = np.full(STEPS, NOT_MEASURABLE, dtype=np.int64)
-        values = scan[FIRST_STEP : LAST_STEP + 1]
-        if config.blocked is not None and config.blocked[0] <= self.started_s < config.blocked[1]:
-            values[:] = rng.choice([NOTHING, WEAK, 25, 31], size=BEAMS)
-            return scan
-        hit = np.isfinite(self._range_m)
-        distance = np.where(hit, self._range_m, config.max_m)
-        patch = _hash_uniform(self._patch)
-        sigma = np.maximum(config.near_sigma_m, config.far_sigma * distance)
-        fresh = rng.standard_normal(BEAMS)
-        measured = distance + sigma * (
-            config.patch_share * np.sqrt(12.0) * (patch - 0.5)
-            + math.sqrt(1.0 - config.patch_share**2) * fresh
-        )
-        values[:] = np.rint(measured * 1000.0)
-        self._mix_edges(values, distance)
-        light = self._albedo * (1.0 - config.albedo_spread * _hash_uniform(self._patch + 0.5)) * self._cos
-        needed = 0.8 * (1.0 - config.albedo_spread / 2) * (distance / config.reach_m) ** 2
-        lost = ~hit | (light < needed * (0.85 + 0.3 * rng.random(BEAMS)))
-        values[lost] = self._code_of_lost(int(lost.sum()))
-        values[(values < 20) & ~lost] = WEAK
-        values[values > round(config.max_m * 1000)] = NOTHING
+        if blocked is not None and blocked[0] <= self.started_s < blocked[1]:
+            values = self._rng.choice([NOTHING, WEAK, 25, 31], size=BEAMS)
+        else:
+            light = Light(self._range_m, self._cos, self._albedo, self._points)
+            values = measure(light, self._config.optics, self._rng)
+        scan[FIRST_STEP : LAST_STEP + 1] = values
         return scan
 
-    def _mix_edges(self, values: NDArray[np.int64], distance: NDArray[np.float64]) -> None:
-        jump = np.flatnonzero(np.abs(np.diff(distance)) > self._config.footprint_m)
-        chance = self._rng.random(len(jump))
-        share = self._rng.random(len(jump))
-        mixed = jump[chance < self._config.edge_mixed]
-        between = distance[mixed] + share[: len(mixed)] * (distance[mixed + 1] - distance[mixed])
-        values[mixed] = np.rint(between * 1000.0)
-        failed = jump[chance > 1.0 - self._config.edge_error]
-        values[failed] = self._rng.choice(
-            [NEIGHBOUR, OTHER, TWO_WAVES], size=len(failed), p=[0.6, 0.35, 0.05]
-        )
-
-    def _code_of_lost(self, count: int) -> NDArray[np.int64]:
-        """Return error codes in the shares of exp1.dat: nearly all 0."""
-        codes = self._rng.random(count)
-        table = np.array([NOTHING, OTHER, NEIGHBOUR, WEAK])
-        return np.asarray(table[np.searchsorted([0.955, 0.97, 0.995], codes)])
-
-
-def _hash_uniform(cells: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a fixed pseudo-random number in [0, 1) for each cell, float64 (N,) from (N, 2)."""
-    mixed = np.sin(cells[:, 0] * 12.9898 + cells[:, 1] * 78.233) * 43758.5453
-    return np.asarray(mixed - np.floor(mixed))
+    def true_ranges_m(self, state: BodyState) -> NDArray[np.float64]:
+        """Return what a perfect sensor would see from a standing robot, float64 (682,), +inf beyond reach."""
+        self._cast(slice(0, BEAMS), self.started_s, self.started_s + self.period_s, state, state)
+        self._next = 0
+        return self._range_m.copy()
