@@ -60,7 +60,10 @@ class PortLost:
 class DriverConfig:
     """How a driver waits."""
 
-    tick_s: float = 0.02  # one period of the base
+    tick_s: float = 0.02
+    """Between two ticks while the device is not there yet: each step of connecting waits for one."""
+    watch_s: float = 0.05
+    """The same while it is there and every packet ticks anyway: this only notices silence."""
     first_wait_s: float = 0.1
     """Before the first attempt to reopen; each further one waits twice as long."""
     longest_wait_s: float = 0.8  # data must flow within 3 s of a replug, and a laser takes 1 s to connect
@@ -133,7 +136,8 @@ class Driver(Generic[E]):
         try:
             while not reading.done():
                 self._take(b"")
-                await asyncio.wait({reading}, timeout=self.config.tick_s)
+                wait_s = self.config.watch_s if self._session.alive else self.config.tick_s
+                await asyncio.wait({reading}, timeout=wait_s)
             reading.result()
         finally:
             self._port = None
