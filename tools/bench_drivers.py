@@ -136,7 +136,7 @@ async def measure_kill() -> None:
             async with running(robot):
                 times.append(await robot.until_data())
     print(
-        f"kill -9, then a new start: packets and scans after {max(times):.2f} s at most of {len(times)} trials"
+        f"kill -9, then a new start: packets and scans after {max(times):.2f} s at most ({len(times)} trials)"
     )
 
 
@@ -210,7 +210,7 @@ async def measure_replug(times: int, rng: random.Random) -> None:
         for cable in cables:
             cable.pull()
     print(
-        f"replug, {times} times each: data after {worst[0]:.2f} s (base) and {worst[1]:.2f} s (laser) at most; "
+        f"replug, {times} times each: data after at most {worst[0]:.2f} s (base), {worst[1]:.2f} s (laser); "
         f"descriptors and threads {before} before, {after} after"
     )
 
