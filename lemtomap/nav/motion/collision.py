@@ -16,6 +16,9 @@ STEP_S = 0.05
 SKIN_M = 0.015
 """Beyond the body's radius; the URG-04LX errs by 30 mm at 1 m, so a wider skin would stick at walls."""
 STOP_SHORT_M = 0.03
+STANDING_SHARE = 0.05
+"""A robot held to less than this share of its speed may turn freely: it is round."""
+TURN_AWAY_RADPS = 0.5
 
 
 def points_now(sightings: Iterable[Sighting], T_odom_base: Pose, within_m: float = 1.6) -> Points:
@@ -47,5 +50,18 @@ def limit_twist(twist: Twist, points_base: Points, body: BodyLimits) -> Twist:
     if v_safe >= abs(twist.v_mps):
         return twist
     share = float(v_safe) / abs(twist.v_mps)
-    turn = twist.w_radps * share if share > 0.05 else twist.w_radps
-    return Twist(twist.v_mps * share, turn)
+    if share > STANDING_SHARE:
+        return Twist(twist.v_mps * share, twist.w_radps * share)
+    return Twist(twist.v_mps * share, _turn_away(twist, points_base))
+
+
+def _turn_away(twist: Twist, points_base: Points) -> float:
+    """Return the turn of a robot that something holds: the wanted one, or away from the nearest point.
+
+    A door post beside the front holds a robot whose way lies clear ahead; a slight turn lets it slip past.
+    """
+    if abs(twist.w_radps) >= TURN_AWAY_RADPS:
+        return twist.w_radps
+    x, y = points_base[np.argmin(np.hypot(points_base[:, 0], points_base[:, 1]))]
+    bearing = np.arctan2(y, x) if twist.v_mps > 0.0 else np.arctan2(-y, -x)
+    return twist.w_radps if bearing == 0.0 else float(np.copysign(TURN_AWAY_RADPS, -bearing))
