@@ -40,6 +40,7 @@ from lemtomap.types import MapView, RouteGraph, Twist
 
 NEAR_BARRIER_M = 1.0
 BUMP_BACK_M = 0.15
+AT_NODE_M = 0.5
 REST = Twist(0.0, 0.0)
 
 
@@ -75,6 +76,7 @@ class Navigator:
         self._planned_s = -np.inf
         self._lost_s: float | None = None
         self._waiting_s: float | None = None
+        self._shut_since_s: float | None = None
         self._command = REST
         self._cycle = 0
         self._follower = Follower(self.config)
@@ -93,7 +95,7 @@ class Navigator:
         """Take a new goal (an int is a node's id); accepted in every state."""
         self._goal = Goal(goal) if isinstance(goal, int) else goal
         self._route, self._plan, self._target = None, None, None
-        self._waiting_s = self._lost_s = None
+        self._waiting_s = self._lost_s = self._shut_since_s = None
         self._planned_s = -np.inf
         self._follower.restart()
         self._barriers.reset()
@@ -167,9 +169,12 @@ class Navigator:
             if self._route is None:  # an edge was closed: look for another way at once
                 return self._act(moment)
             route = self._route
+        if self._goal_is_shut(route, moment):
+            return self._fail(moment, Reason.BLOCKED, f"the goal is out of reach from node {route.nodes[-1]}")
         recovering = self._recover_step(moment)
-        if recovering is not None:
-            return recovering
+        return self._go(route, moment) if recovering is None else recovering
+
+    def _go(self, route: Route, moment: _Moment) -> NavOutput:
         if self._plan is None or self._target is None:
             return self._no_way(route, moment)
         self._waiting_s = None
@@ -207,6 +212,19 @@ class Navigator:
             self._plan = plan_to(costs, moment.T_grid_base, self._target.cell)
         self._reopen(reach, moment)
         self._check_barrier(route, reach, moment)
+
+    def _goal_is_shut(self, route: Route, moment: _Moment) -> bool:
+        """Tell whether the robot has stood at the goal's node for a while with no way to the goal itself."""
+        target, at_node = self._target, False
+        if target is not None and not target.final and target.index == len(route.nodes) - 1:
+            place = moment.map_view.T_grid_node.get(target.node_id)
+            at_node = place is not None and float(np.hypot(*(place - moment.T_grid_base)[:2])) < AT_NODE_M
+        if not at_node:
+            self._shut_since_s = None
+        elif self._shut_since_s is None:
+            self._shut_since_s = moment.now_s
+        since_s = self._shut_since_s
+        return since_s is not None and moment.now_s - since_s > self.config.recovery.closed_after_s
 
     def _reopen(self, reach: Reach, moment: _Moment) -> None:
         for edge_id, a, b in links_open_again(self._closed, moment.map_view, reach):

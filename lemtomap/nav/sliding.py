@@ -142,6 +142,9 @@ def _target_at(
     if not reach.costs.holds(place, border_m):
         return None
     found = reach.nearest(place, goal_tolerance_m if final else SNAP_M)
+    if found is None and final and goal.p_node != (0.0, 0.0):  # go to its node and look from there
+        final = False
+        found = reach.nearest(T_grid_node[route.nodes[index]], SNAP_M)
     if found is None:
         return None
     return Target(index, route.nodes[index], found[:2], final, found[2] == 1)
