@@ -129,6 +129,16 @@ def chain_covariance(first: Covariance, T_b_c: Pose, second: Covariance) -> Cova
     return np.asarray(carry @ first @ carry.T + second)
 
 
+def measured_alone(posterior: Covariance, prior: Covariance) -> Covariance:
+    """Return the covariance of the measurement that made `posterior` of `prior`; a metre where it told
+    nothing.
+
+    Information adds up, so the measurement's is the difference; rounding may leave it slightly negative.
+    """
+    values, axes = np.linalg.eigh(np.linalg.inv(posterior) - np.linalg.inv(prior))
+    return np.asarray(axes @ np.diag(1.0 / np.maximum(values, 1.0)) @ axes.T)
+
+
 @dataclass(frozen=True, slots=True)
 class Area:
     """A room or corridor: nodes with the same area ID belong to it."""

@@ -33,6 +33,8 @@ class Standing:
     """Measured in this window, rather than predicted by the graph."""
     born: bool = False
     """Made in this window: no match stands behind its pose."""
+    seen: Covariance | None = None
+    """What the window alone says of the pose, the graph's prediction apart; None when it says nothing."""
 
 
 class LocalMap:
@@ -45,9 +47,17 @@ class LocalMap:
         self.standings: dict[int, Standing] = {}
         self.reached: dict[int, Reached] = {}
 
-    def anchor(self, node_id: int, T_grid_node: Pose, covariance: Covariance, *, born: bool = False) -> None:
-        """Set a node's pose as measured in this window."""
-        self.standings[node_id] = Standing(T_grid_node, covariance, anchored=True, born=born)
+    def anchor(
+        self,
+        node_id: int,
+        T_grid_node: Pose,
+        covariance: Covariance,
+        *,
+        born: bool = False,
+        seen: Covariance | None = None,
+    ) -> None:
+        """Set a node's pose as measured in this window; `seen` is the covariance of the measurement alone."""
+        self.standings[node_id] = Standing(T_grid_node, covariance, anchored=True, born=born, seen=seen)
 
     def release_matched(self) -> None:
         """Let go of all nodes whose poses rest on matches and closures (one of them proved wrong)."""

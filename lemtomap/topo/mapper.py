@@ -12,7 +12,7 @@ from lemtomap.se2 import Pose, adjoint, compose
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import NavEvent
-from lemtomap.topo.graph import Covariance, Edge, Place, chain_covariance
+from lemtomap.topo.graph import Covariance, Edge, Place, chain_covariance, measured_alone
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
 from lemtomap.topo.local import LocalMap, Standing
@@ -147,7 +147,9 @@ class TopoMapper:
             self._associate_or_create()
         if self._recogniser is not None:
             self._recogniser.update(self)
-        self.trail.append(slam.stamp_s, self._associated_id, self.T_node_base)
+        standing = self.local.standings[self._associated_id]
+        seen = standing.seen if standing.anchored else None
+        self.trail.append(slam, self._associated_id, self.T_node_base, seen)
         self.store.tick(slam.stamp_s)
 
     # -- the steps of Figure 3-6 ----------------------------------------------------------------------------
@@ -228,7 +230,7 @@ class TopoMapper:
         node = self.graph.add_node(area_id=area_id, level=self.level, created_s=now.slam.stamp_s)
         T_grid_node = np.array(now.slam.T_grid_base, dtype=np.float64)
         covariance = _relative_to_window(now.slam)
-        self.local.anchor(node.node_id, T_grid_node, covariance, born=True)
+        self.local.anchor(node.node_id, T_grid_node, covariance, born=True, seen=COVARIANCE_FLOOR)
         self.keeper.due(node.node_id)
         self._associated_id = node.node_id
         self._drift = np.zeros((3, 3))
@@ -259,7 +261,8 @@ class TopoMapper:
             return Transform(measured=False, covariance=standing.covariance, score=0.0, reason="no data")
         if match.refused:
             return Transform(False, standing.covariance, match.score, match.refused)
-        self.local.anchor(node_id, match.T_grid_node, match.covariance)
+        seen = measured_alone(match.covariance, standing.covariance)
+        self.local.anchor(node_id, match.T_grid_node, match.covariance, seen=seen)
         self.keeper.compare(node_id, match)
         return Transform(measured=True, covariance=match.covariance, score=match.score)
 

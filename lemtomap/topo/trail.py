@@ -10,8 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose
+from lemtomap.types import SlamUpdate
 
-RECORD = np.dtype([("stamp_s", "<f8"), ("node_id", "<i8"), ("T_node_base", "<f8", (3,))])
+RECORD = np.dtype(
+    [
+        ("stamp_s", "<f8"),
+        ("node_id", "<i8"),
+        ("T_node_base", "<f8", (3,)),
+        (
+            "T_grid_base",
+            "<f8",
+            (3,),
+        ),  # the window's own, smooth track: what joins one node's stretch to the next
+        ("step", "<f4", (3, 3)),  # covariance of the motion since the scan before, axes of the base before
+        ("tie", "<f4", (3, 3)),  # covariance of T_grid_node, axes of the node; NaN while it is only predicted
+    ]
+)
 _BUFFERED = 256
 
 
@@ -35,10 +49,14 @@ class ScanTrail:
         """Keep the trail in a file of its own."""
         return cls(path.open("w+b"))
 
-    def append(self, stamp_s: float, node_id: int, T_node_base: Pose) -> None:
-        """Add one scan."""
+    def append(
+        self, slam: SlamUpdate, node_id: int, T_node_base: Pose, tie: NDArray[np.float64] | None
+    ) -> None:
+        """Add one scan; tie: covariance of the node's pose in the window, None while it is only predicted."""
         record = self._buffer[self._filled]
-        record["stamp_s"], record["node_id"], record["T_node_base"] = stamp_s, node_id, T_node_base
+        record["stamp_s"], record["node_id"], record["T_node_base"] = slam.stamp_s, node_id, T_node_base
+        record["T_grid_base"], record["step"] = slam.T_grid_base, slam.step_covariance
+        record["tie"] = np.nan if tie is None else tie
         self._filled += 1
         self.count += 1
         if self._filled == _BUFFERED:

@@ -1,0 +1,340 @@
+"""Explicit topological loop closing (thesis, section 3-3-2), in slices beside the mapping.
+
+At each new or re-entered node: which known places may lie here, given how unsure the graph is (outlook) and
+what the surroundings look like (descriptors)? Each is searched in a snapshot of the window, a slice per
+update. What is found is a sighting; sightings gather into hypotheses; a certain one becomes a closure.
+"""
+
+from collections import deque
+from collections.abc import Callable, Container
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose, adjoint, between, compose
+from lemtomap.topo.graph import Covariance, chain_covariance
+from lemtomap.topo.loops.config import LoopConfig
+from lemtomap.topo.loops.descriptor import BYTES, describe, distances, unpack
+from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis, Sighting
+from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
+from lemtomap.topo.loops.outlook import Outlook
+from lemtomap.topo.loops.places import PlaceBook
+from lemtomap.topo.paging import PagedGraph
+from lemtomap.types import GridView
+
+USUAL_UNLIKENESS = 45.0  # descriptor distance of two visits to one place
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """Where the robot is, as the mapper sees it at one update."""
+
+    here_id: int
+    T_grid_here: Pose
+    covariance: Covariance
+    """float64 (3, 3) of T_grid_here, axes of the node."""
+    T_grid_base: Pose
+    travelled_m: float
+    grid: GridView
+    measured: Container[int]
+    """Nodes whose place in this window is sure: born in it, or found in it by a search."""
+
+
+@dataclass(frozen=True, slots=True)
+class Closure:
+    """A relation between two nodes that has become certain."""
+
+    here_id: int
+    node_id: int
+    T_here_node: Pose
+    covariance: Covariance
+    """float64 (3, 3), axes of the target."""
+    T_grid_node: Pose
+    """Where it was seen in the window."""
+    match: Match
+    informs: bool
+    """Whether the first node's place in the window was sure, so that the relation tells something new."""
+
+
+@dataclass(frozen=True, slots=True)
+class Confirmed:
+    """The associated node was found about where the mapper has it, only better."""
+
+    node_id: int
+    T_grid_node: Pose
+    covariance: Covariance
+
+
+@dataclass(slots=True)
+class _Task:
+    """One place to search in one snapshot."""
+
+    node_id: int
+    situation: Situation
+    reference: Reference
+    box: SearchBox
+    hearing_for: Hypothesis | None = None
+    search: Search | None = None
+
+
+class LoopCloser:
+    """Finds where the robot has been before. Owned by the mapping thread."""
+
+    def __init__(self, config: LoopConfig, graph: PagedGraph) -> None:
+        self.config = config
+        self.graph = graph
+        self.places = PlaceBook(graph, config.company_m, config.search_points)
+        self.hypotheses = Hypotheses(config, lambda node_id: self.places.around(node_id, 20.0, 96))
+        self.searched = 0
+        self.work = 0
+        self.confirmed: list[Confirmed] = []
+        self._outlook: Outlook | None = None
+        self._since_outlook = 0
+        self._tasks: deque[_Task] = deque()
+        self._tried: dict[int, float] = {}
+        self._descriptors: dict[int, NDArray[np.float32]] = {}
+        self.log: Callable[[str], None] | None = None
+
+    def place_taken(self, node_id: int, descriptor: bytes) -> None:
+        """Take note of a node's localisation data, new or renewed."""
+        if len(descriptor) == BYTES:
+            self._descriptors[node_id] = unpack(descriptor)[0]
+        self.places.forget(node_id)
+
+    def at_node(self, situation: Situation, points_grid: NDArray[np.float64]) -> None:
+        """Look for known places here: call when a node was made or became the associated one.
+
+        points_grid: averaged hits in the window, float (N, 2), metres, grid frame.
+        """
+        self._renew_outlook(situation.here_id)
+        self.hypotheses.drop_old(situation.travelled_m)
+        chosen = self._candidates(situation, points_grid)
+        if situation.here_id not in situation.measured and situation.here_id in self._descriptors:
+            chosen.insert(0, situation.here_id)
+        if not chosen and not self.hypotheses.alive:
+            return
+        reference: Reference | None = None
+        for node_id in dict.fromkeys([*self._followed(situation), *chosen]):
+            box = self._box(situation, node_id)
+            if box is None:
+                continue
+            reference = reference or Reference(situation.grid, points_grid, self.config.match)
+            self._tried[node_id] = situation.travelled_m
+            self._tasks.append(_Task(node_id, situation, reference, box))
+        while len(self._tasks) > 4 * self.config.hearing:
+            self._tasks.popleft()
+
+    def update(self) -> list[Closure]:
+        """Work a slice; return the closures that became certain."""
+        if self._outlook is not None:
+            self._outlook.advance(self.config.gate.outlook_per_update)
+        budget = self.config.budget
+        while self._tasks and budget > 0:
+            budget -= self._work(self._tasks[0], budget)
+        hypothesis = self.hypotheses.certain()
+        return [] if hypothesis is None else self._commit(hypothesis)
+
+    # -- which places
+    # -----------------------------------------------------------------------------------------
+
+    def _renew_outlook(self, here_id: int) -> None:
+        self._since_outlook += 1
+        outlook = self._outlook
+        if outlook is None or self._since_outlook > self.config.gate.renew_after:
+            self._outlook = Outlook(self.graph, here_id, self.config.gate)
+            self._since_outlook = 0
+            self._outlook.advance(200)
+        elif here_id not in outlook:
+            outlook.extend(here_id)
+
+    def _candidates(self, situation: Situation, points_grid: NDArray[np.float64]) -> list[int]:
+        """Return the places worth a search here, most promising first."""
+        outlook, gate = self._outlook, self.config.gate
+        if outlook is None or (robot := self._robot_in(outlook, situation)) is None:
+            return []
+        near = [
+            node_id
+            for node_id in outlook.near(situation.here_id, robot[0], robot[1], gate.reach_m, gate.least_way_m)
+            if node_id in self._descriptors
+            and node_id not in situation.measured
+            and situation.travelled_m - self._tried.get(node_id, -np.inf) >= self.config.again_after_m
+            and self._far_over_edges(situation.here_id, node_id)
+        ]
+        if not near:
+            return []
+        base = situation.T_grid_base[:2]
+        around = points_grid[np.abs(points_grid - base).max(axis=1) <= self.config.describe_m]
+        unlike = distances(describe(around), np.array([self._descriptors[node_id] for node_id in near]))
+        doubt = np.array([outlook.offness(situation.here_id, node_id, robot) for node_id in near])
+        order = np.argsort((unlike / USUAL_UNLIKENESS) ** 2 + doubt, kind="stable")
+        return self._spaced([near[i] for i in order], self.config.candidates)
+
+    def _far_over_edges(self, here_id: int, node_id: int) -> bool:
+        """Tell whether a node is no part of the neighbourhood that lies in the window anyway."""
+        seen = None if self._outlook is None else self._outlook.between(here_id, node_id)
+        return seen is not None and seen.way_m >= self.config.gate.least_way_m
+
+    def _spaced(self, node_ids: list[int], count: int) -> list[int]:
+        """Return the first few that are not next to one another."""
+        outlook = self._outlook
+        chosen: list[int] = []
+        places: list[Pose] = []
+        for node_id in node_ids:
+            at = None if outlook is None else outlook.pose(node_id)
+            if at is None:
+                continue
+            if all(np.hypot(at[0] - b[0], at[1] - b[1]) >= self.config.spacing_m for b in places):
+                chosen.append(node_id)
+                places.append(at)
+            if len(chosen) == count:
+                break
+        return chosen
+
+    def _followed(self, situation: Situation) -> list[int]:
+        """Return, for each hypothesis, the known node that should be nearest to the robot now."""
+        chosen = []
+        for hypothesis in self.hypotheses.alive:
+            seen = hypothesis.latest
+            base = situation.T_grid_base
+            best, best_m = 0, np.inf
+            for node_id, T_seen_node in self.places.around(seen.node_id, 12.0, 48).items():
+                at = compose(seen.match.T_grid_place, T_seen_node)
+                gap_m = float(np.hypot(at[0] - base[0], at[1] - base[1]))
+                if gap_m < best_m and node_id in self._descriptors and node_id not in situation.measured:
+                    best, best_m = node_id, gap_m
+            if best and situation.travelled_m - self._tried.get(best, -np.inf) >= 0.5 * self.config.apart_m:
+                chosen.append(best)
+        return chosen
+
+    def _robot_in(self, outlook: Outlook, situation: Situation) -> Pose | None:
+        T_anchor_here = outlook.pose(situation.here_id)
+        if T_anchor_here is None:
+            return None
+        return compose(T_anchor_here, between(situation.T_grid_here, situation.T_grid_base))
+
+    def _box(self, situation: Situation, node_id: int) -> SearchBox | None:
+        """Return where to search a node in the window: the gate, never wider than the window."""
+        outlook, gate = self._outlook, self.config.gate
+        seen = None if outlook is None else outlook.between(situation.here_id, node_id)
+        if seen is None:
+            return None
+        if situation.here_id not in situation.measured:
+            gate = gate.unsure()
+        T_grid_node = compose(situation.T_grid_here, seen.T_from_node)
+        turn = adjoint(np.array([0.0, 0.0, situation.T_grid_here[2]]))
+        sigma = np.sqrt(np.diag(turn @ seen.covariance @ turn.T))
+        half = np.clip(
+            gate.gate_sigmas * sigma,
+            [gate.least_box_m, gate.least_box_m, gate.least_box_rad],
+            [gate.widest_m, gate.widest_m, gate.widest_rad],
+        )
+        return SearchBox(T_grid_node, float(half[0]), float(half[1]), float(half[2]))
+
+    # -- searching
+    # --------------------------------------------------------------------------------------------
+
+    def _work(self, task: _Task, budget: int) -> int:
+        """Do a slice of the first task; return the work spent."""
+        if task.search is None:
+            company = self.places.company(task.node_id)
+            if company is None:
+                self._tasks.popleft()
+                return 1
+            task.search = Search(task.reference, company.search_points, task.box)
+            self.searched += 1
+        before = task.search.work
+        done = task.search.advance(budget)
+        spent = task.search.work - before
+        self.work += spent
+        if done:
+            self._tasks.popleft()
+            self._judge(task)
+        return max(1, spent)
+
+    def _judge(self, task: _Task) -> None:
+        """Make a sighting of what a finished search found, and hear the others when it is a new belief."""
+        match = task.search.match if task.search is not None else None
+        if match is not None and self._is_sighting(match, task) and not self._confirms(match, task):
+            hypothesis = self.hypotheses.add(self._sighting(task, match))
+            if self.log:
+                self.log(
+                    f"sighting {task.situation.here_id}->{task.node_id} n={len(hypothesis.sightings)} {match}"
+                )
+            if len(hypothesis.sightings) == 1:
+                self._hear(task, hypothesis)
+        if task.hearing_for is not None and not any(t.hearing_for is task.hearing_for for t in self._tasks):
+            task.hearing_for.heard = True
+
+    def _confirms(self, match: Match, task: _Task) -> bool:
+        """Take a search for the associated node that found it where it was thought to be."""
+        situation = task.situation
+        if task.node_id != situation.here_id:
+            return False
+        off = between(situation.T_grid_here, match.T_grid_place)
+        near = np.hypot(off[0], off[1]) <= self.config.agree_m and abs(off[2]) <= self.config.agree_rad
+        if near:
+            self.confirmed.append(Confirmed(task.node_id, match.T_grid_place, match.covariance))
+        return bool(near)
+
+    def _is_sighting(self, match: Match, task: _Task) -> bool:
+        config = self.config
+        company = self.places.company(task.node_id)
+        explained = match.explained * match.known * (0 if company is None else len(company.points_node))
+        return (
+            match.explained >= config.explained
+            and match.contradicted <= config.contradicted
+            and match.known >= config.known
+            and match.rival <= config.rival
+            and explained >= config.points
+        )
+
+    def _sighting(self, task: _Task, match: Match) -> Sighting:
+        """Relate the node found to the node the robot was at."""
+        here = task.situation
+        T_here_node = between(here.T_grid_here, match.T_grid_place)
+        covariance = chain_covariance(
+            _reversed(here.T_grid_here, here.covariance), match.T_grid_place, match.covariance
+        )
+        informs = here.here_id in here.measured and here.here_id != task.node_id
+        return Sighting(task.node_id, match, here.here_id, T_here_node, covariance, here.travelled_m, informs)
+
+    def _hear(self, task: _Task, hypothesis: Hypothesis) -> None:
+        """Search every other place within the gate before the belief may become certain."""
+        outlook, gate, situation = self._outlook, self.config.gate, task.situation
+        robot = None if outlook is None else self._robot_in(outlook, situation)
+        heard = []
+        if outlook is not None and robot is not None:
+            near = outlook.near(situation.here_id, robot[0], robot[1], gate.reach_m, gate.least_way_m)
+            same = self.places.around(task.node_id, self.config.company_m, 48)
+            rest = [
+                node_id
+                for node_id in near
+                if node_id not in same and node_id in self._descriptors and node_id not in situation.measured
+            ]
+            heard = self._spaced(rest, self.config.hearing)
+        for node_id in heard:
+            box = self._box(situation, node_id)
+            if box is not None:
+                self._tasks.append(_Task(node_id, situation, task.reference, box, hypothesis))
+        hypothesis.heard = not heard
+
+    def _commit(self, hypothesis: Hypothesis) -> list[Closure]:
+        """Make a certain hypothesis closures, one for each sighting, and start with a fresh outlook."""
+        closures = [
+            Closure(
+                s.here_id, s.node_id, s.T_here_node, s.covariance, s.match.T_grid_place, s.match, s.informs
+            )
+            for s in hypothesis.sightings
+        ]
+        self.hypotheses.alive.clear()
+        self._tasks.clear()
+        self._since_outlook = self.config.gate.renew_after
+        self.places.forget()
+        return closures
+
+
+def _reversed(T_a_b: Pose, covariance: Covariance) -> Covariance:
+    """Return the covariance of T_b_a (axes of a) from that of T_a_b (axes of b)."""
+    turn = adjoint(T_a_b)
+    return np.asarray(turn @ covariance @ turn.T)

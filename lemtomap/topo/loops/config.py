@@ -1,0 +1,87 @@
+"""Settings of place recognition, each with its unit and source. One set for every building and sensor."""
+
+from dataclasses import dataclass, field, replace
+
+from lemtomap.errors import BadSetting
+
+
+@dataclass(frozen=True, slots=True)
+class MatchConfig:
+    """Correlative search and fine alignment (Olson 2009; Hess et al. 2016)."""
+
+    cell_m: float = 0.1  # search cell: two window cells; the fine alignment does the rest
+    spread_m: float = 0.1  # falloff of a score away from an obstacle: one search cell
+    contradiction: int = -40  # score of a stored obstacle in space now seen free (an obstacle: 100)
+    occupied_from: int = 40  # GridView occupancy that counts as an obstacle
+    free_below: int = 25  # GridView occupancy that counts as seen free
+    levels: int = 6  # pyramid: the coarsest bound covers 2**5 cells = 3.2 m
+    angle_reach_m: float = 5.0  # lever arm that sets the angle step: turning by one moves no point a cell
+    least_score: float = 0.38  # of a perfect match; a place two thirds in view scores above 0.5
+    distinct_m: float = 0.6  # a runner-up is another place when it is at least this far away
+    distinct_rad: float = 0.3  # ... or turned by this
+    heap_blocks: int = 60_000  # 2 MB; a search that needs more is ambiguous and given up
+    nearest_m: float = 0.3  # reach of the fine alignment
+    line_reach_m: float = 0.25  # neighbourhood a wall's direction is taken from
+    residual_m: float = 0.05  # scale of the robust weight: one window cell
+    rounds: int = 12  # Gauss-Newton converges within this from half a search cell
+    point_sigma_m: float = 0.03  # of one averaged point across its wall
+    correlation: float = 12.0  # neighbouring points err together: information is divided by this
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.least_score < 1.0:
+            raise BadSetting(f"least_score must lie between 0 and 1, is {self.least_score}")
+        if not 2 <= self.levels <= 8:
+            raise BadSetting(f"levels must lie between 2 and 8, is {self.levels}")
+
+
+@dataclass(frozen=True, slots=True)
+class GateConfig:
+    """How far off a place may be from where the graph expects it, and which places are worth a look."""
+
+    outlook_nodes: int = 20_000  # nodes kept in view around the robot, 4 MB; further ones by look-up only
+    outlook_per_update: int = 40  # nodes reached in one update: 0.3 ms
+    renew_after: int = 16  # new nodes before the outlook starts afresh from where the robot is
+    shift_var_per_m: float = 0.02**2  # m^2 per m, on top of the edges' own: what a window's map is bent by
+    turn_var_per_m: float = 0.004**2  # rad^2 per m, likewise
+    arm_m: float = 10.0  # weighs heading against shift when ways are compared: half a window
+    gate_sigmas: float = 3.0  # 99.7 % of what the graph itself thinks possible
+    least_box_m: float = 1.0  # a search is never narrower than this
+    least_box_rad: float = 0.15
+    unsure_box_m: float = (
+        2.0  # ... while the robot's own node is only predicted: a window slips along a corridor
+    )
+    unsure_box_rad: float = 0.25
+    widest_m: float = 9.0  # nor wider than the window
+    widest_rad: float = 1.0
+    least_way_m: float = 12.0  # nearer places over edges lie in the window already
+    reach_m: float = 4.0  # a place this near shares enough of the window
+
+    def unsure(self) -> "GateConfig":
+        """Return the gate for a robot whose own node is only predicted in the window."""
+        return replace(self, least_box_m=self.unsure_box_m, least_box_rad=self.unsure_box_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class LoopConfig:
+    """When a place is believed to be one known before."""
+
+    match: MatchConfig = field(default_factory=MatchConfig)
+    gate: GateConfig = field(default_factory=GateConfig)
+    budget: int = 6_000  # bound evaluations in one update: 4 ms
+    candidates: int = 3  # places searched at one event, the most alike and likely first
+    hearing: int = 24  # ... and before a closure is committed: all others within the gate, up to this
+    spacing_m: float = 1.5  # of places heard; a place covers its neighbours
+    again_after_m: float = 2.0  # travel before a place that did not fit is tried again
+    company_m: float = 7.0  # places this near over edges are searched as one
+    describe_m: float = 5.0  # half the side of what is compared: a node's localisation data reach as far
+    search_points: int = 240  # a search needs no more; the alignment takes all
+    explained: float = 0.82  # a sighting: least share of known points on obstacles, ...
+    contradicted: float = 0.13  # ... most in free space (true revisits on three logs: 0.08 to 0.12), ...
+    known: float = 0.5  # ... least in known space, ...
+    rival: float = 0.8  # ... most a different pose may score, ...
+    points: int = 60  # ... and least explained: six metres of wall
+    sightings: int = 2  # that agree, before a closure is committed
+    apart_m: float = 1.5  # travel between sightings that count
+    agree_m: float = 0.35  # sightings agree when they put the same node within this ...
+    agree_rad: float = 0.08  # ... and this
+    forget_after_m: float = 12.0  # travel without a new sighting after which a hypothesis is dropped

@@ -1,0 +1,198 @@
+"""How surely the graph knows where its nodes lie from here: the gate every closure must pass.
+
+Along the shortest way over edges errors add up: each edge's own, and each edge's heading error times the arm
+from it to the node asked for. The sums of heading variance and its first and second moments give that exactly
+to first order, for every pair of nodes, in one pass without matrices.
+"""
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, hypot, sin
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose, between
+from lemtomap.topo.graph import Edge
+from lemtomap.topo.loops.config import GateConfig
+
+# Columns of a node's sums: translation variance, heading variance, and that times the place of each edge
+# (x, y) and its square (xx, xy, yy), in the anchor's frame.
+SHIFT, TURN, TURN_X, TURN_Y, TURN_XX, TURN_XY, TURN_YY = range(7)
+Sums = NDArray[np.float64]
+
+
+class EdgeSource(Protocol):
+    """What the outlook reads of a graph."""
+
+    def edges_of(self, node_id: int) -> Sequence[Edge]:
+        """Return the edges at a node."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """Where one node should be, seen from another."""
+
+    T_from_node: Pose
+    covariance: NDArray[np.float64]
+    """float64 (3, 3), axes of the first node; heading uncorrelated with the rest."""
+    way_m: float
+    """Length of the way over edges."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    way_m: float
+    via_id: int
+    depth: int
+    sums: tuple[float, ...]
+
+
+class Outlook:
+    """Expected poses of the nodes around one anchor node, found a slice at a time, surest first."""
+
+    def __init__(self, graph: EdgeSource, anchor_id: int, config: GateConfig) -> None:
+        self.anchor_id = anchor_id
+        self._graph = graph
+        self._config = config
+        self._known: dict[int, _Known] = {}
+        start = _Known(0.0, 0.0, 0.0, 0.0, 0, 0, (0.0,) * 7)
+        self._queue: list[tuple[float, int, int, _Known]] = [(0.0, 0, anchor_id, start)]
+        self._pushed = 0
+        self._ids: list[int] = []
+        self._rows = np.empty((64, 11))
+
+    @property
+    def done(self) -> bool:
+        """Whether every node that counts has been reached."""
+        return not self._queue or len(self._known) >= self._config.outlook_nodes
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    def __contains__(self, node_id: int) -> bool:
+        return node_id in self._known
+
+    def advance(self, nodes: int) -> bool:
+        """Reach up to `nodes` more; return True when done."""
+        while nodes > 0 and self._queue and len(self._known) < self._config.outlook_nodes:
+            cost, _, node_id, known = heapq.heappop(self._queue)
+            if node_id not in self._known:
+                nodes -= 1
+                self._settle(node_id, known, cost)
+        return self.done
+
+    def extend(self, node_id: int) -> None:
+        """Reach a node made since the outlook began, over its surest edge to a node already reached."""
+        ways = [
+            self._step(self._known[other_id], edge, other_id)
+            for edge in self._graph.edges_of(node_id)
+            if (other_id := edge.other(node_id)) in self._known
+        ]
+        if ways:
+            cost, known = min(ways, key=lambda way: way[0])
+            self._settle(node_id, known, cost)
+
+    def _settle(self, node_id: int, known: _Known, cost: float) -> None:
+        self._known[node_id] = known
+        if len(self._ids) == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._rows[len(self._ids)] = (known.x_m, known.y_m, known.yaw_rad, known.way_m, *known.sums)
+        self._ids.append(node_id)
+        for edge in self._graph.edges_of(node_id):
+            other_id = edge.other(node_id)
+            if other_id not in self._known:
+                self._pushed += 1
+                step_cost, after = self._step(known, edge, node_id)
+                heapq.heappush(self._queue, (cost + step_cost, self._pushed, other_id, after))
+
+    def _step(self, known: _Known, edge: Edge, node_id: int) -> tuple[float, _Known]:
+        """Return what crossing an edge costs (doubt, so that well measured ways win) and where it leads."""
+        dx, dy, turn = edge.seen_from(node_id).tolist()
+        length = hypot(dx, dy)
+        config = self._config
+        (xx, _, _), (_, yy, _), (_, _, turn_var) = edge.covariance.tolist()
+        shift_var = 0.5 * (xx + yy) + config.shift_var_per_m * length
+        turn_var += config.turn_var_per_m * length
+        c, s = cos(known.yaw_rad), sin(known.yaw_rad)
+        x, y = known.x_m + c * dx - s * dy, known.y_m + s * dx + c * dy
+        mx, my = 0.5 * (x + known.x_m), 0.5 * (y + known.y_m)
+        before = known.sums
+        sums = (
+            before[SHIFT] + shift_var,
+            before[TURN] + turn_var,
+            before[TURN_X] + turn_var * mx,
+            before[TURN_Y] + turn_var * my,
+            before[TURN_XX] + turn_var * mx * mx,
+            before[TURN_XY] + turn_var * mx * my,
+            before[TURN_YY] + turn_var * my * my,
+        )
+        after = _Known(x, y, known.yaw_rad + turn, known.way_m + length, node_id, known.depth + 1, sums)
+        return shift_var + config.arm_m**2 * turn_var, after
+
+    def pose(self, node_id: int) -> Pose | None:
+        """Return T_anchor_node; None while a node is not reached."""
+        k = self._known.get(node_id)
+        return None if k is None else np.array([k.x_m, k.y_m, k.yaw_rad])
+
+    def between(self, from_id: int, node_id: int) -> Expected | None:
+        """Return where a node should be, seen from another; None when either is not reached."""
+        a, b = self._known.get(from_id), self._known.get(node_id)
+        if a is None or b is None:
+            return None
+        common = self._common(from_id, node_id)
+        sums = np.array(a.sums) + np.array(b.sums) - 2.0 * np.array(common.sums)
+        xx, xy, yy = _spread(sums, b.x_m, b.y_m)
+        covariance = np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, sums[TURN]]])
+        c, s = cos(a.yaw_rad), sin(a.yaw_rad)
+        turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        T_from_node = between(np.array([a.x_m, a.y_m, a.yaw_rad]), np.array([b.x_m, b.y_m, b.yaw_rad]))
+        return Expected(T_from_node, turn @ covariance @ turn.T, a.way_m + b.way_m - 2.0 * common.way_m)
+
+    def _common(self, a_id: int, b_id: int) -> _Known:
+        """Return the last node that the ways to two nodes share."""
+        a, b = self._known[a_id], self._known[b_id]
+        while a_id != b_id:
+            if a.depth >= b.depth:
+                a_id = a.via_id
+                a = self._known[a_id]
+            else:
+                b_id = b.via_id
+                b = self._known[b_id]
+        return a
+
+    def near(self, from_id: int, x_m: float, y_m: float, reach_m: float, least_way_m: float) -> list[int]:
+        """Return the nodes that may lie within `reach_m` of a point of the anchor's frame, seen from a node.
+
+        Only nodes at least `least_way_m` away over edges; generous, as both ways to the anchor count in full.
+        """
+        start = self._known[from_id]
+        rows = self._rows[: len(self._ids)]
+        gap_m = np.hypot(rows[:, 0] - x_m, rows[:, 1] - y_m)
+        sums = rows[:, 4:].T + np.array(start.sums)[:, None]
+        xx, _, yy = _spread(sums, rows[:, 0], rows[:, 1])
+        doubt_m = np.minimum(self._config.gate_sigmas * np.sqrt(xx + yy), self._config.widest_m)
+        inside = (gap_m <= reach_m + doubt_m) & (rows[:, 3] + start.way_m >= least_way_m)
+        return [self._ids[i] for i in np.flatnonzero(inside)]
+
+    def offness(self, from_id: int, node_id: int, T_anchor_robot: Pose) -> float:
+        """Return how unlikely it is that the robot is at a node: squared distance in doubts, 1 m added."""
+        node, start = self._known[node_id], self._known[from_id]
+        sums = np.array(node.sums) + np.array(start.sums)
+        xx, _, yy = _spread(sums, node.x_m, node.y_m)
+        gap2 = (node.x_m - T_anchor_robot[0]) ** 2 + (node.y_m - T_anchor_robot[1]) ** 2
+        return float(gap2 / (1.0 + 0.5 * (xx + yy)))
+
+
+def _spread(sums: Sums, x_m: Sums | float, y_m: Sums | float) -> tuple[Sums, Sums, Sums]:
+    """Return the variances xx, xy, yy of a point at (x, y), anchor's axes."""
+    arm_xx = sums[TURN_YY] - 2.0 * sums[TURN_Y] * y_m + sums[TURN] * y_m * y_m
+    arm_yy = sums[TURN_XX] - 2.0 * sums[TURN_X] * x_m + sums[TURN] * x_m * x_m
+    arm_xy = sums[TURN_XY] - sums[TURN_X] * y_m - sums[TURN_Y] * x_m + sums[TURN] * x_m * y_m
+    return sums[SHIFT] + np.maximum(arm_xx, 0.0), -arm_xy, sums[SHIFT] + np.maximum(arm_yy, 0.0)

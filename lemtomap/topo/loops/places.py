@@ -1,0 +1,103 @@
+"""Stored places as the search wants them: decoded, joined with the places around them, thinned."""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose, compose, transform
+from lemtomap.topo.paging import PagedGraph, Reached
+from lemtomap.topo.place import decode_place
+
+T = TypeVar("T")
+Points = NDArray[np.float64]
+RASTER_M = 0.1  # of joined places: as fine as they are stored
+
+
+@dataclass(frozen=True, slots=True)
+class Company:
+    """A place with its neighbours, all in the frame of its node."""
+
+    node_id: int
+    points_node: Points
+    """float64 (N, 2), metres."""
+    search_points: Points
+    """An even choice of them."""
+
+
+class PlaceBook:
+    """Localisation data by node, decoded when asked for, the last few hundred kept."""
+
+    def __init__(self, graph: PagedGraph, company_m: float, search_points: int, kept: int = 256) -> None:
+        self._graph = graph
+        self._company_m = company_m
+        self._search_points = search_points
+        self._kept = kept
+        self._points: OrderedDict[int, Points | None] = OrderedDict()
+        self._companies: OrderedDict[int, Company | None] = OrderedDict()
+
+    def points(self, node_id: int) -> Points | None:
+        """Return a node's obstacle points in its own frame, None when it has no localisation data."""
+        return _kept(self._points, node_id, self._kept, self._decode)
+
+    def company(self, node_id: int) -> Company | None:
+        """Return a node's place joined with those around it; None when the node itself has none."""
+        return _kept(self._companies, node_id, self._kept, self._join)
+
+    def forget(self, *node_ids: int) -> None:
+        """Read these nodes afresh (and all companies, which they may belong to)."""
+        for node_id in node_ids:
+            self._points.pop(node_id, None)
+        self._companies.clear()
+
+    def around(self, node_id: int, way_m: float, limit: int = 64) -> dict[int, Pose]:
+        """Return T_node_other of the nodes within a way of one node, by the edges of the shortest way."""
+        return chain(self._graph.reach(node_id, way_m, limit))
+
+    def _decode(self, node_id: int) -> Points | None:
+        place = self._graph.store.place(node_id)
+        return None if place is None else decode_place(place.boundary).points.astype(np.float64)
+
+    def _join(self, node_id: int) -> Company | None:
+        own = self.points(node_id)
+        if own is None or len(own) == 0:
+            return None
+        parts = [own]
+        for other_id, T_node_other in self.around(node_id, self._company_m, 32).items():
+            points = self.points(other_id)
+            if other_id != node_id and points is not None and len(points):
+                parts.append(transform(T_node_other, points))
+        joined = np.concatenate(parts)
+        joined = joined[np.hypot(joined[:, 0], joined[:, 1]) <= self._company_m]
+        _, first = np.unique(np.round(joined / RASTER_M).astype(np.int64), axis=0, return_index=True)
+        joined = np.ascontiguousarray(joined[np.sort(first)])
+        stride = max(1.0, len(joined) / self._search_points)
+        chosen = joined[
+            np.unique(np.minimum(np.arange(0, len(joined), stride), len(joined) - 1).astype(np.int64))
+        ]
+        return Company(node_id, joined, np.ascontiguousarray(chosen))
+
+
+def chain(reached: dict[int, Reached]) -> dict[int, Pose]:
+    """Return the pose of every reached node in the frame of the start."""
+    poses: dict[int, Pose] = {}
+    for node_id, way in reached.items():
+        if way.via is None:
+            poses[node_id] = np.zeros(3)
+        else:
+            before = way.via.other(node_id)
+            poses[node_id] = compose(poses[before], way.via.seen_from(before))
+    return poses
+
+
+def _kept(cache: OrderedDict[int, T], key: int, size: int, make: Callable[[int], T]) -> T:
+    if key not in cache:
+        cache[key] = make(key)
+        if len(cache) > size:
+            cache.popitem(last=False)
+    else:
+        cache.move_to_end(key)
+    return cache[key]

@@ -1,0 +1,102 @@
+"""What the mapper talks to: places in, closures out (thesis, section 3-3-2: the explicit check)."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose
+from lemtomap.topo.graph import Place
+from lemtomap.topo.loops.closer import Closure, Confirmed, LoopCloser, Situation
+from lemtomap.topo.loops.config import LoopConfig
+from lemtomap.topo.loops.descriptor import describe
+
+if TYPE_CHECKING:
+    from lemtomap.topo.mapper import TopoMapper
+
+HITS_REACH_M = 14.2  # half the diagonal of a 20 m window
+
+
+class LoopRecogniser:
+    """Explicit loop closing for one mapper (its `recogniser`)."""
+
+    def __init__(self, config: LoopConfig | None = None) -> None:
+        self.config = config or LoopConfig()
+        self.closures: list[tuple[int, Closure]] = []
+        """(edge ID, closure) of all that were committed."""
+        self._closer: LoopCloser | None = None
+        self._found: dict[int, Pose] = {}
+        self._waiting: list[tuple[int, bytes]] = []
+
+    def describe(self, points_node: NDArray[np.float64]) -> bytes:
+        """Return the rotation-invariant descriptor of boundary points, float64 (N, 2), node frame."""
+        return describe(points_node)
+
+    def place_taken(self, node_id: int, place: Place) -> None:
+        """Take note of a node's localisation data, new or renewed."""
+        if self._closer is None:
+            self._waiting.append((node_id, place.descriptor))
+        else:
+            self._closer.place_taken(node_id, place.descriptor)
+
+    def at_node(self, mapper: "TopoMapper", *, born: bool) -> None:  # noqa: ARG002
+        """Look for known places around a node that was made or became the associated one."""
+        slam, grid = mapper.now
+        here_id = mapper.associated_id
+        standing = mapper.local.standings[here_id]
+        measured = frozenset(node_id for node_id in mapper.local.standings if self._stands(mapper, node_id))
+        x, y = slam.T_grid_base[:2].tolist()
+        situation = Situation(
+            here_id,
+            standing.T_grid_node,
+            standing.covariance,
+            slam.T_grid_base,
+            mapper.travelled_m,
+            grid,
+            measured,
+        )
+        points = mapper.keeper.hits.around((x, y), HITS_REACH_M, grid, mapper.config.occupied_from)
+        self._of(mapper).at_node(situation, points)
+
+    def update(self, mapper: "TopoMapper") -> None:
+        """Work a slice after each scan; closes loops."""
+        closer = self._of(mapper)
+        closures = closer.update()
+        for closure in closures:
+            if closure.informs:
+                edge = mapper.close_loop(
+                    closure.here_id, closure.node_id, closure.T_here_node, closure.covariance
+                )
+                self.closures.append((edge.edge_id, closure))
+        for closure in closures:
+            self._anchor(mapper, Confirmed(closure.node_id, closure.T_grid_node, closure.match.covariance))
+        if closures and not self._stands(mapper, mapper.associated_id):
+            latest = closures[-1]
+            mapper.relocate(latest.node_id, latest.T_grid_node, latest.match.covariance)
+            self._anchor(mapper, Confirmed(latest.node_id, latest.T_grid_node, latest.match.covariance))
+        for confirmed in closer.confirmed:
+            self._anchor(mapper, confirmed)
+        closer.confirmed.clear()
+
+    def _stands(self, mapper: "TopoMapper", node_id: int) -> bool:
+        """Tell whether a node's place in the window is sure."""
+        each = mapper.local.standings.get(node_id)
+        return (
+            each is not None and each.anchored and (each.born or self._found.get(node_id) is each.T_grid_node)
+        )
+
+    def _anchor(self, mapper: "TopoMapper", confirmed: Confirmed) -> None:
+        """Set a node in the window where it was found, unless it was made there."""
+        standing = mapper.local.standings.get(confirmed.node_id)
+        if standing is None or not (standing.born and standing.anchored):
+            mapper.local.anchor(
+                confirmed.node_id, confirmed.T_grid_node, confirmed.covariance, seen=confirmed.covariance
+            )
+            self._found[confirmed.node_id] = confirmed.T_grid_node
+
+    def _of(self, mapper: "TopoMapper") -> LoopCloser:
+        if self._closer is None:
+            self._closer = LoopCloser(self.config, mapper.graph)
+            for node_id, descriptor in self._waiting:
+                self._closer.place_taken(node_id, descriptor)
+        return self._closer
