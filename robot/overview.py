@@ -89,13 +89,22 @@ def _draw_whole(axes: Axes, overview: Overview) -> None:
     _draw_graph(axes, overview)
     corners = se2.transform(overview.T_map_grid, _corners(overview.grid))
     axes.plot(corners[:, 0], corners[:, 1], color="#888888", linewidth=1, linestyle="--", zorder=2)
-    _draw_robot(axes, path[-1])
+    shown = np.concatenate([overview.walls, path[:, :2]])
+    low, high = (
+        np.quantile(shown, 0.001, axis=0),
+        np.quantile(shown, 0.999, axis=0),
+    )  # stray beams do not count
+    margin_m = 0.04 * float((high - low).max()) + 0.5
+    axes.set_xlim(low[0] - margin_m, high[0] + margin_m)
+    axes.set_ylim(low[1] - margin_m, high[1] + margin_m)
+    _draw_robot(axes, path[-1], max(0.25, 0.012 * float((high - low).max())))
     axes.set_aspect("equal")
-    axes.margins(0.02)
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     axes.set_title("the whole map, solved once for this picture", fontsize=11)
-    axes.legend(handles=_legend(overview), loc="best", fontsize=8, framealpha=0.9)
+    axes.legend(
+        handles=_legend(overview), loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=3, fontsize=9
+    )
 
 
 def _draw_walls(axes: Axes, walls: NDArray[np.float64]) -> None:
@@ -144,9 +153,9 @@ def _draw_graph(axes: Axes, overview: Overview) -> None:
             axes.annotate(name, (x, y), textcoords="offset points", xytext=(4, 4), fontsize=9, zorder=9)
 
 
-def _draw_robot(axes: Axes, T_map_base: Pose) -> None:
+def _draw_robot(axes: Axes, T_map_base: Pose, size_m: float) -> None:
     """Draw the robot where the drive ended, nose forward."""
-    nose = se2.transform(T_map_base, np.array([[0.9, 0.0], [-0.45, 0.5], [-0.45, -0.5]]))
+    nose = se2.transform(T_map_base, size_m * np.array([[1.8, 0.0], [-0.9, 1.0], [-0.9, -1.0]]))
     axes.fill(nose[:, 0], nose[:, 1], color=ROBOT_COLOUR, zorder=8)
 
 
@@ -161,7 +170,7 @@ def _draw_window(axes: Axes, overview: Overview) -> None:
         nodes = np.array(list(overview.T_map_node.values()))[:, :2]
         nodes_grid = se2.transform(T_grid_map, nodes)
         axes.scatter(nodes_grid[:, 0], nodes_grid[:, 1], s=10, color=NODE_COLOUR, linewidths=0)
-    _draw_robot(axes, se2.compose(T_grid_map, overview.trajectory[-1]))
+    _draw_robot(axes, se2.compose(T_grid_map, overview.trajectory[-1]), 0.35)
     axes.set_xlim(x0, x1)
     axes.set_ylim(y0, y1)
     axes.set_aspect("equal")

@@ -203,6 +203,7 @@ class Viewer:
             ),
             cell_size=costmap.resolution_m,
             translation=[*costmap.origin_m, Z_COSTMAP],
+            opacity=0.99,  # at 1.0 the viewer takes it for opaque and paints clear cells black
         )
         self._stream.log("grid/costmap", veil)
 

@@ -103,7 +103,7 @@ def _eye(height_m: float) -> rrb.EyeControls3D:
         position=[0.0, -0.01, height_m],
         look_target=[0.0, 0.0, 0.0],
         eye_up=[0.0, 1.0, 0.0],
-        tracking_entity="grid/eye",
+        tracking_entity="/grid/robot/body",
     )
 
 
