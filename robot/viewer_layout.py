@@ -66,8 +66,8 @@ def blueprint() -> rrb.Blueprint:
 def _map_view() -> rrb.Spatial3DView:
     """Return the view from above that follows the robot."""
     return rrb.Spatial3DView(
-        origin="grid",
-        contents=["+ $origin/**", "- $origin/costmap"],
+        origin="grid/eye",  # moves with the robot, does not turn with it
+        contents=["+ /grid/**", "- /grid/costmap"],
         name="Map and robot",
         eye_controls=_eye(EYE_HEIGHT_M),
         line_grid=False,
@@ -79,14 +79,14 @@ def _map_view() -> rrb.Spatial3DView:
 def _costmap_view() -> rrb.Spatial3DView:
     """Return the closer view of what navigation avoids."""
     contents = [
-        "+ $origin/costmap",
-        "+ $origin/window",
-        "+ $origin/plan/**",
-        "+ $origin/robot/**",
-        "+ $origin/eye",
+        "+ /grid/costmap",
+        "+ /grid/window",
+        "+ /grid/plan/**",
+        "+ /grid/robot/**",
+        "+ /grid/eye",
     ]
     return rrb.Spatial3DView(
-        origin="grid",
+        origin="grid/eye",  # moves with the robot, does not turn with it
         contents=contents,
         name="Costmap and plan",
         eye_controls=_eye(0.6 * EYE_HEIGHT_M),
@@ -97,13 +97,12 @@ def _costmap_view() -> rrb.Spatial3DView:
 
 
 def _eye(height_m: float) -> rrb.EyeControls3D:
-    """Return an eye straight above the robot that moves with it, x to the right."""
+    """Return an eye straight above the origin, x to the right."""
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         position=[0.0, -0.01, height_m],
         look_target=[0.0, 0.0, 0.0],
         eye_up=[0.0, 1.0, 0.0],
-        tracking_entity="/grid/robot/body",
     )
 
 
