@@ -95,3 +95,55 @@ def test_same_log_and_seed_give_the_same_bytes(log, out, tmp_path):
 def test_the_other_metric_layers_map_it_too(log, tmp_path, slam):
     assert main(["map", str(log), "--out", str(tmp_path / slam), "--slam", slam, "--particles", "2"]) == 0
     assert len((tmp_path / slam / "trajectory.tum").read_text().splitlines()) == SCANS
+
+
+@pytest.fixture
+def ask(out, tmp_path, capsys):
+    """Run a command on a copy of the map; return (exit code, what it said)."""
+    map_file = tmp_path / "room.lemto"
+    map_file.write_bytes((out / "map.lemto").read_bytes())
+
+    def run(command, *arguments):
+        code = main([command, str(map_file), *(str(argument) for argument in arguments)])
+        said = capsys.readouterr()
+        return code, (said.out + said.err).strip()
+
+    return run
+
+
+def test_a_place_is_named_blocked_and_given_back_by_undo(ask):
+    assert ask("edit", "name", 2, "kitchen") == (0, "node 2 is now 'kitchen'")
+    assert ask("edit", "block", "kitchen", 3)[0] == 0
+    assert "kitchen = 2" in ask("info")[1]
+    assert ask("edit", "undo")[0] == ask("edit", "undo")[0] == 0
+    assert "names         none" in ask("info")[1]
+    assert ask("edit", "undo") == (0, "nothing to take back")
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["dance"], "must be one of name, unname"),
+        (["name", "2"], "needs NODE NAME"),
+        (["name", "9999", "x"], "'9999'"),
+        (["level", "2", "upstairs"], "'upstairs'"),
+    ],
+)
+def test_an_edit_that_cannot_be_is_one_line(ask, words, reason):
+    code, said = ask("edit", *words)
+    assert code == 2
+    assert reason in said
+    assert said.count("\n") == 0
+
+
+@pytest.mark.parametrize("suffix", ["geojson", "tmap2", "g2o", "graphml", "png"])
+def test_the_map_is_written_for_other_programs(ask, tmp_path, suffix):
+    target = tmp_path / f"room.{suffix}"
+    assert ask("export", target)[0] == 0
+    assert target.stat().st_size > 100
+
+
+def test_an_export_nobody_knows_is_refused(ask, tmp_path):
+    code, said = ask("export", tmp_path / "room.doc")
+    assert (code, (tmp_path / "room.doc").exists()) == (2, False)
+    assert ".geojson" in said

@@ -1,0 +1,150 @@
+"""What a person does with a map file: look into it, correct it, hand it to other programs."""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from lemtomap.errors import BadSetting
+from lemtomap.topo import edit, export, journal
+from lemtomap.topo.info import MapInfo, describe_map
+from lemtomap.topo.store import TopoStore
+
+Edit = Callable[[TopoStore, Sequence[str]], str]
+
+
+def info(path: Path) -> str:
+    """Return what a map holds, a line each. Raises BadMap."""
+    with TopoStore.open(path) as store:
+        held = describe_map(store)
+    return "\n".join(f"{name:<13} {value}" for name, value in _facts(held))
+
+
+def _facts(held: MapInfo) -> list[tuple[str, str]]:
+    """Return names and values in the order a person asks for them."""
+    edges = ", ".join(f"{count:,} {kind.replace('_', ' ')}" for kind, count in held.edges.items())
+    per_node = held.file_bytes / held.nodes if held.nodes else 0.0
+    return [
+        ("nodes", f"{held.nodes:,}"),
+        ("edges", edges),
+        ("driven", f"{held.edge_length_m:,.0f} m of first ways"),
+        ("components", f"{held.components}" + (" (parts not joined yet)" if held.components > 1 else "")),
+        ("levels", ", ".join(f"{level}: {count} nodes" for level, count in sorted(held.levels.items()))),
+        ("names", ", ".join(f"{name} = {node}" for name, node in sorted(held.names.items())) or "none"),
+        ("places", f"{held.places:,} recognisable, {held.place_bytes / max(1, held.places):.0f} bytes each"),
+        ("openings", ", ".join(f"{count} {state}" for state, count in held.openings.items()) or "none"),
+        ("edits", f"{held.undoable} can be undone"),
+        ("file", f"{held.file_bytes / 1000:,.1f} kB, {per_node:.0f} bytes a node"),
+    ]
+
+
+def apply_edit(path: Path, words: Sequence[str]) -> str:
+    """Change a map and return what was done. Raises BadMap, BadSetting; then nothing has changed."""
+    kind, rest = words[0], words[1:]
+    if kind not in EDITS:
+        raise BadSetting(f"edit '{kind}': must be one of {', '.join(EDITS)}")
+    wanted, action = EDITS[kind]
+    if len(rest) != len(wanted):
+        raise BadSetting(f"edit {kind}: needs {' '.join(wanted) or 'nothing more'}")
+    with TopoStore.open(path) as store:
+        return action(store, rest)
+
+
+def _name(store: TopoStore, words: Sequence[str]) -> str:
+    node_id = edit.resolve_node(store, words[0])
+    edit.name_node(store, node_id, words[1], time.time())
+    return f"node {node_id} is now '{words[1]}'"
+
+
+def _unname(store: TopoStore, words: Sequence[str]) -> str:
+    edit.unname(store, words[0], time.time())
+    return f"the name '{words[0]}' is gone"
+
+
+def _delete(store: TopoStore, words: Sequence[str]) -> str:
+    node_id = edit.resolve_node(store, words[0])
+    edit.delete_node(store, node_id, time.time())
+    return f"node {node_id} is deleted, with its edges"
+
+
+def _delete_edge(store: TopoStore, words: Sequence[str]) -> str:
+    edge = edit.edge_between(store, *(edit.resolve_node(store, word) for word in words))
+    edit.delete_edge(store, edge.edge_id, time.time())
+    return f"the {edge.type.value.replace('_', ' ')} edge {words[0]} - {words[1]} is deleted"
+
+
+def _block(store: TopoStore, words: Sequence[str]) -> str:
+    edge = edit.edge_between(store, *(edit.resolve_node(store, word) for word in words))
+    edit.block_edge(store, edge.edge_id, stamp_s=time.time())
+    return f"the way {words[0]} - {words[1]} is closed"
+
+
+def _open(store: TopoStore, words: Sequence[str]) -> str:
+    edge = edit.edge_between(store, *(edit.resolve_node(store, word) for word in words))
+    edit.block_edge(store, edge.edge_id, 0.0, time.time())
+    return f"the way {words[0]} - {words[1]} is open"
+
+
+def _level(store: TopoStore, words: Sequence[str]) -> str:
+    node_id = edit.resolve_node(store, words[0])
+    try:
+        level = int(words[1])
+    except ValueError:
+        raise BadSetting(f"edit level: '{words[1]}' is no level, a level is a whole number") from None
+    edit.set_level(store, node_id, level, time.time())
+    return f"node {node_id} is on level {level}"
+
+
+def _undo(store: TopoStore, _: Sequence[str]) -> str:
+    what = journal.undo(store)
+    return f"taken back: {what}" if what is not None else "nothing to take back"
+
+
+def _history(store: TopoStore, _: Sequence[str]) -> str:
+    return "\n".join(entry.what for entry in journal.entries(store)) or "no edits"
+
+
+EDITS: dict[str, tuple[tuple[str, ...], Edit]] = {
+    "name": (("NODE", "NAME"), _name),
+    "unname": (("NAME",), _unname),
+    "delete": (("NODE",), _delete),
+    "delete-edge": (("NODE", "NODE"), _delete_edge),
+    "block": (("NODE", "NODE"), _block),
+    "open": (("NODE", "NODE"), _open),
+    "level": (("NODE", "LEVEL"), _level),
+    "undo": ((), _undo),
+    "history": ((), _history),
+}
+
+
+def export_map(path: Path, target: Path) -> str:
+    """Write the map for another program, by the target's suffix. Raises BadMap, BadSetting."""
+    writer = EXPORTS.get(target.suffix.lower())
+    if writer is None:
+        raise BadSetting(f"{target}: unknown kind; known are {', '.join(EXPORTS)}")
+    with TopoStore.open(path) as store:
+        writer(store, target)
+    return f"{target} written; {NOTES[target.suffix.lower()]}"
+
+
+def _write_png(store: TopoStore, target: Path) -> None:
+    """Draw; matplotlib is loaded only when it is needed."""
+    from lemtomap.topo.picture import write_png  # noqa: PLC0415
+
+    write_png(store, target)
+
+
+EXPORTS: dict[str, Callable[[TopoStore, Path], None]] = {
+    ".geojson": export.write_geojson,
+    ".tmap2": export.write_tmap2,
+    ".g2o": export.write_g2o,
+    ".graphml": export.write_graphml,
+    ".png": _write_png,
+}
+_PLACED = "its coordinates come from one full solve and are approximate"
+NOTES = {
+    ".geojson": f"nav2 route server; {_PLACED}",
+    ".tmap2": f"topological_navigation; {_PLACED}",
+    ".g2o": f"pose graph; {_PLACED}",
+    ".graphml": "relative poses as the map holds them",
+    ".png": f"a picture; {_PLACED}",
+}
