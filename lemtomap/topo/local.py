@@ -59,6 +59,12 @@ class LocalMap:
         """Set a node's pose as measured in this window; `seen` is the covariance of the measurement alone."""
         self.standings[node_id] = Standing(T_grid_node, covariance, anchored=True, born=born, seen=seen)
 
+    def doubt(self, node_id: int, widen: float, widest_m: float) -> None:
+        """Believe a prediction less: the window did not bear it out."""
+        standing = self.standings[node_id]
+        if float(np.trace(standing.covariance[:2, :2])) < 2.0 * widest_m**2:
+            self.standings[node_id] = replace(standing, covariance=widen * standing.covariance)
+
     def release_matched(self) -> None:
         """Let go of all nodes whose poses rest on matches and closures (one of them proved wrong)."""
         for node_id, standing in self.standings.items():

@@ -248,6 +248,8 @@ class TopoMapper:
             self._transform = Transform(measured=True, covariance=standing.covariance)
         else:
             self._transform = self._measured(node_id)
+            if not self._transform.measured:
+                self.local.doubt(node_id, self.config.align_widen, self.config.align_widest_m)
         standing = self.local.standings[node_id]
         seen = _relative_to_window(self._require().slam)
         self._drift = chain_covariance(standing.covariance, self.T_node_base, seen)

@@ -187,23 +187,35 @@ def search(
     half_rad: float,
     step_rad: float,
     sigma: float,
+    apart_m: float,
 ) -> Values:
-    """Return the best pose of a regular search around a centre, float64 (4,): pose and its fit."""
+    """Return the best pose of a regular search around a centre, its fit, and the best fit elsewhere.
+
+    float64 (5,). Elsewhere is further than `apart_m` from the best; -1 when the search goes no further.
+    """
     shifts, turns = math.ceil(half_m / step_m), math.ceil(half_rad / step_rad)
-    best = np.empty(4)
-    best[3] = -1.0
+    fits = np.empty((2 * shifts + 1, 2 * shifts + 1))
+    out = np.array([centre[0], centre[1], centre[2], -1.0, -1.0])
+    best_i, best_j = 0, 0
     pose = np.empty(3)
-    for t in range(-turns, turns + 1):
-        pose[2] = centre[2] + t * step_rad
-        for i in range(-shifts, shifts + 1):
-            pose[0] = centre[0] + i * step_m
-            for j in range(-shifts, shifts + 1):
-                pose[1] = centre[1] + j * step_m
+    for i in range(-shifts, shifts + 1):
+        pose[0] = centre[0] + i * step_m
+        for j in range(-shifts, shifts + 1):
+            pose[1] = centre[1] + j * step_m
+            fits[i + shifts, j + shifts] = -1.0
+            for t in range(-turns, turns + 1):
+                pose[2] = centre[2] + t * step_rad
                 value = fit(points, targets, field, low_x, low_y, cell, pose, sigma)
-                if value > best[3]:
-                    best[:3] = pose
-                    best[3] = value
-    return best
+                fits[i + shifts, j + shifts] = max(fits[i + shifts, j + shifts], value)
+                if value > out[3]:
+                    out[:3] = pose
+                    out[3] = value
+                    best_i, best_j = i, j
+    for i in range(-shifts, shifts + 1):
+        for j in range(-shifts, shifts + 1):
+            if math.hypot(i - best_i, j - best_j) * step_m > apart_m:
+                out[4] = max(out[4], fits[i + shifts, j + shifts])
+    return out
 
 
 @njit(nogil=True, cache=True)

@@ -29,7 +29,9 @@ class MatchConfig:
     sigma_m: float = 0.05  # scatter of boundary points about hits: half a coding cell
     coarse_sigma_m: float = 0.15  # for the search: as wide as its step
     points_per_look: float = 8.0  # neighbouring points err together; so many count as one
-    max_search_m: float = 0.6  # wider than this it is loop closing's business
+    apart_m: float = 0.35  # poses further apart than this are rivals in the search
+    rival_share: float = 0.93  # a rival with this share of the best fit makes the search undecided
+    max_search_m: float = 1.0  # wider than this it is loop closing's business
     max_search_rad: float = 0.25
 
 
@@ -99,15 +101,19 @@ def _field(targets: NDArray[np.float64], centre: Pose, half_m: float) -> _Field:
 def _searched(
     boundary: Boundary, field: _Field, start: Pose, covariance: Covariance, config: MatchConfig
 ) -> Pose:
-    """Return the best start for the refinement within the prediction's three sigmas."""
+    """Return the best start for the refinement within the prediction's three sigmas.
+
+    Where several places look alike (along a corridor) the prediction is the start.
+    """
     half_m = min(3.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1])), config.max_search_m)
     half_rad = min(3.0 * float(np.sqrt(covariance[2, 2])), config.max_search_rad)
     step_m, step_rad = 0.1, 0.04  # a boundary point 5 m away moves 0.2 m: twice the step, within the field
     if half_m < step_m and half_rad < step_rad:
         return start
-    sigma_m = config.coarse_sigma_m
-    best = kernels.search(boundary.points, *field.plan, start, half_m, step_m, half_rad, step_rad, sigma_m)
-    return np.array(best[:3])
+    extent = (half_m, step_m, half_rad, step_rad)
+    best = kernels.search(boundary.points, *field.plan, start, *extent, config.coarse_sigma_m, config.apart_m)
+    ambiguous = best[4] > config.rival_share * best[3]
+    return start if ambiguous else np.array(best[:3])
 
 
 def _refined(
