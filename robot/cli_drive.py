@@ -40,7 +40,10 @@ def register(app: typer.Typer) -> None:
 def sim(
     *,
     world: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="a built-in world or a floor plan .yaml")
+        str,
+        typer.Option(
+            metavar="NAME|FILE", help="a built-in world ('list' shows them), or a .yaml or .toml file"
+        ),
     ] = "office",
     mission: Annotated[
         str,
@@ -59,6 +62,9 @@ def sim(
     ] = Path("runs/sim"),
 ) -> None:
     """Run the whole robot in a simulated building, on fake serial ports."""
+    if world == "list":
+        typer.echo(list_worlds(out))
+        return
     if serve:
         from sim.serve import serve_world
 
@@ -73,6 +79,21 @@ def sim(
         summary = run_sim(options, bar)
     typer.echo(told_after_run(out, summary))
     raise typer.Exit(summary["result"] == "failed")
+
+
+def list_worlds(out: Path) -> str:
+    """Return a line about each built-in world, and draw each into out/worlds."""
+    from sim import worlds
+    from sim.picture import save_picture
+
+    folder = out / "worlds"
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = []
+    for name, about in worlds.describe().items():
+        picture = folder / f"{name}.png"
+        save_picture(worlds.load(name), picture)
+        lines.append(f"{name:9s} {about}\n          {picture}")
+    return "\n".join(lines)
 
 
 def run(

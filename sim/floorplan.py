@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from sim.errors import BadWorld
+from sim.faults import Faults
 from sim.raster import SPAWN_CLEARANCE_M, clearance_m, find_spawn, rasterise
 from sim.world import Box, Door, GroundTruth, Pose2, Room, Surface, World
 
@@ -84,6 +85,7 @@ class FloorPlan:
         self._wall_height_m = wall_height_m
         self.flat = True
         self.dock: Pose2 | None = None
+        self.faults: Faults | None = None
         self._walls: list[_Wall] = []
         self._boxes: list[Box] = []
         self._rooms: list[Room] = []
@@ -188,6 +190,7 @@ class FloorPlan:
             dock=self.dock,
             flat=self.flat,
             level_height_m=self.level_height_m,
+            faults=self.faults,
             description=description,
         )
 

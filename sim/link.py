@@ -2,31 +2,13 @@
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from sim.errors import Unplugged
+from sim.faults import LinkFaults
 
 MAX_WAITING = 1 << 16  # bytes a host that never reads may let pile up, as a tty buffer would
-
-
-@dataclass(frozen=True, slots=True)
-class LinkFaults:
-    """What is wrong with one cable; all zero is a perfect one."""
-
-    lose_byte: float = 0.0
-    """Chance that a byte towards the host is lost."""
-    flip_bit: float = 0.0
-    """Chance that a byte towards the host has one bit flipped."""
-    burst_s: float = 0.0
-    """Bytes arrive only at multiples of this (an FTDI latency timer of 16 ms: 0.016)."""
-    delay_s: float = 0.0
-    """Bytes arrive later by this."""
-    jitter_s: float = 0.0
-    """Bytes arrive later by up to this, at random."""
-    unplugged: tuple[tuple[float, float], ...] = ()
-    """Times (from, to) in s of the run during which the cable is out."""
 
 
 class Link:
@@ -53,6 +35,11 @@ class Link:
         """Whether bytes can flow now."""
         now = self._clock()
         return not self._pulled and not any(begin <= now < end for begin, end in self._faults.unplugged)
+
+    @property
+    def will_unplug(self) -> bool:
+        """Whether the faults pull this cable at some time."""
+        return bool(self._faults.unplugged)
 
     def deliver(self, data: bytes, sent_s: float) -> None:
         """Send from the device at a time; a whole piece is dropped when the host does not read."""
@@ -136,6 +123,11 @@ class HostPort:
     def plugged(self) -> bool:
         """Whether the cable is in."""
         return self._link.plugged
+
+    @property
+    def will_unplug(self) -> bool:
+        """Whether the run's faults pull this cable at some time."""
+        return self._link.will_unplug
 
     def read(self) -> bytes:
         """Return everything that has arrived by now, perhaps nothing. Raises Unplugged."""

@@ -6,6 +6,7 @@ import os
 import struct
 import termios
 import tty
+from pathlib import Path
 
 FULL_BYTES = 3500  # the kernel's line discipline holds 4095; beyond this nobody is reading in time
 
@@ -13,14 +14,33 @@ FULL_BYTES = 3500  # the kernel's line discipline holds 4095; beyond this nobody
 class PtyPort:
     """The device's end of one pseudo-terminal; `path` is what a client opens."""
 
-    def __init__(self) -> None:
-        self._master, self._slave = os.openpty()  # the slave stays open, or a client's close would hang up
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
+    def __init__(self, link: Path | None = None) -> None:
+        """Open the port; `link` keeps the same name when it is unplugged and plugged in again."""
+        self._link = link
+        self._rest = b""
+        self._master = self._slave = -1
+        self.path = ""
         self.dropped_frames = 0
         """Frames nobody read in time."""
-        self._rest = b""
+        self.plug(into=True)
+
+    def plug(self, *, into: bool) -> None:
+        """Pull the cable out (the client sees a hang-up), or plug it in again; what is done is done."""
+        if into and not self.plugged:
+            self._master, self._slave = os.openpty()  # kept open, or a client's close would hang up
+            tty.setraw(self._slave)
+            os.set_blocking(self._master, False)
+            self.path = os.ttyname(self._slave)
+            if self._link is not None:
+                self._link.symlink_to(self.path)
+                self.path = str(self._link)
+        elif not into and self.plugged:
+            self.close()
+
+    @property
+    def plugged(self) -> bool:
+        """Whether there is a port."""
+        return self._master >= 0
 
     def fileno(self) -> int:
         """For select."""
@@ -64,3 +84,6 @@ class PtyPort:
             if fd >= 0:
                 os.close(fd)
         self._master = self._slave = -1
+        self._rest = b""
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.errors import SimError
 from sim.world import ALBEDO, Box, Pose2, Surface, World
 
 
@@ -74,9 +75,13 @@ class Scene:
     """The boxes of a world as pybullet bodies, and the robot among them."""
 
     def __init__(self, world: World, *, gui: bool = False) -> None:
+        if gui and not os.environ.get("DISPLAY"):
+            raise SimError("pybullet's window needs a display, and DISPLAY is not set")
         self.client: int = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         self._shapes: dict[tuple[float, float, float], int] = {}
         self._parts: list[list[tuple[int, Box]]] = []
+        self.flat = world.flat
+        """The floor is the plane z = 0 and has no body."""
         self.alive = bool(world.movers)
         """Something may come and touch the robot even when it stands."""
         self._albedo: dict[int, float] = {}
@@ -87,6 +92,7 @@ class Scene:
         self._base = self._cylinder(BODY_RADIUS_M, BODY_HIGH_M - BODY_LOW_M)
         self._tower = self._cylinder(TOWER_RADIUS_M, TOWER_HIGH_M - BODY_HIGH_M)
         self._robots = (self._base, self._tower)
+        self._shells = ((self._base, BODY_LOW_M, BODY_HIGH_M), (self._tower, BODY_HIGH_M, TOWER_HIGH_M))
         table = np.zeros(max(self._albedo, default=0) + 2)
         for body, albedo in self._albedo.items():
             table[body] = albedo
@@ -171,6 +177,16 @@ class Scene:
                 physicsClientId=self.client,
             )
 
+    def show_robot(self, pose: Pose2, height_m: float) -> None:
+        """Put the robot where a window shall show it."""
+        for robot, low, high in self._shells:
+            self._place(robot, pose, height_m + (low + high) / 2)
+
+    def _place(self, robot: int, pose: Pose2, middle_m: float) -> None:
+        pybullet.resetBasePositionAndOrientation(
+            robot, (pose[0], pose[1], middle_m), (0, 0, 0, 1), physicsClientId=self.client
+        )
+
     def contacts(self, pose: Pose2, height_m: float = 0.0, near_m: float = 0.002) -> list[Contact]:
         """Put the robot at a pose and return what it touches, or nearly touches, within near_m."""
         x, y, _ = pose
@@ -185,16 +201,8 @@ class Scene:
 
     def _touch(self, thing: int, pose: Pose2, height_m: float, near_m: float) -> list[Contact]:
         found = []
-        for robot, low, high in (
-            (self._base, BODY_LOW_M, BODY_HIGH_M),
-            (self._tower, BODY_HIGH_M, TOWER_HIGH_M),
-        ):
-            pybullet.resetBasePositionAndOrientation(
-                robot,
-                (pose[0], pose[1], height_m + (low + high) / 2),
-                (0, 0, 0, 1),
-                physicsClientId=self.client,
-            )
+        for robot, low, high in self._shells:
+            self._place(robot, pose, height_m + (low + high) / 2)
             for point in pybullet.getClosestPoints(robot, thing, near_m, physicsClientId=self.client):
                 nx, ny, nz = point[7]
                 level = math.hypot(nx, ny)

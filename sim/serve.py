@@ -12,6 +12,7 @@ import os
 import select
 import signal
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -19,7 +20,7 @@ from types import FrameType
 from typing import TextIO
 
 from sim import worlds
-from sim.errors import BadWorld, Unplugged
+from sim.errors import SimError, Unplugged
 from sim.link import HostPort
 from sim.pty_port import PtyPort
 from sim.simulator import STEP_S, Simulator
@@ -33,14 +34,20 @@ class PtyServer:
 
     def __init__(self, simulator: Simulator, truth_log: TextIO | None = None) -> None:
         self._simulator = simulator
-        self._pairs: list[tuple[HostPort, PtyPort]] = [
-            (simulator.kobuki, PtyPort()),
-            (simulator.hokuyo, PtyPort()),
-        ]
+        self._links: tempfile.TemporaryDirectory[str] | None = None
+        self._pairs = [(port, self._open(port)) for port in (simulator.kobuki, simulator.hokuyo)]
         self._truth_log = truth_log
         self._logged_s = 0.0
         self.lost_s = 0.0
         """Real time given up because the machine was too slow."""
+
+    def _open(self, port: HostPort) -> PtyPort:
+        """Open a pseudo-terminal; one that will be unplugged gets a name that stays."""
+        if not port.will_unplug:
+            return PtyPort()
+        if self._links is None:
+            self._links = tempfile.TemporaryDirectory(prefix="lemtomap-sim-")
+        return PtyPort(Path(self._links.name) / port.name)
 
     @property
     def kobuki_path(self) -> str:
@@ -75,13 +82,14 @@ class PtyServer:
     def _listen(self, until_s: float) -> None:
         """Wait for the next step, taking commands as they come."""
         while (left_s := until_s - time.monotonic()) > 0:
-            ready, _, _ = select.select([pty for _, pty in self._pairs], [], [], left_s)
+            ready, _, _ = select.select([pty for _, pty in self._pairs if pty.plugged], [], [], left_s)
             for port, pty in self._pairs:
                 if pty in ready:
                     _forward(port, pty.read())
 
     def _send(self) -> None:
         for port, pty in self._pairs:
+            pty.plug(into=port.plugged)
             try:
                 frames = port.read_frames()
             except Unplugged:
@@ -101,6 +109,8 @@ class PtyServer:
         for _, pty in self._pairs:
             pty.close()
         self._pairs.clear()
+        if self._links is not None:
+            self._links.cleanup()
 
 
 def _forward(port: HostPort, data: bytes) -> None:
@@ -184,7 +194,7 @@ def main() -> int:
             gui=arguments.gui,
             parent=arguments.parent,
         )
-    except BadWorld as error:
+    except SimError as error:
         sys.stderr.write(f"{error}\n")
         return 2
     return 0

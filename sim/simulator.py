@@ -1,15 +1,17 @@
 """One robot in one world on a virtual clock: host ends of two cables, and the truth beside them."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.base import BIT_RATE, Base, BaseConfig
 from sim.body import BodyState
+from sim.depth import DepthCamera, DepthConfig
+from sim.faults import Faults
 from sim.hokuyo import HokuyoConfig, HokuyoFirmware
-from sim.link import HostPort, Link, LinkFaults
+from sim.link import HostPort, Link
 from sim.scene import Scene
 from sim.urg import Urg, UrgConfig
 from sim.world import World
@@ -20,19 +22,12 @@ SCAN_USB_S = 0.003  # 2137 bytes in 64-byte packets at full speed
 
 
 @dataclass(frozen=True, slots=True)
-class Faults:
-    """What goes wrong on the two cables; stuck encoders: BodyConfig; a blocked laser: UrgConfig."""
-
-    kobuki: LinkFaults = field(default_factory=LinkFaults)
-    hokuyo: LinkFaults = field(default_factory=LinkFaults)
-
-
-@dataclass(frozen=True, slots=True)
 class SimConfig:
     """How the robot is built."""
 
     base: BaseConfig = field(default_factory=BaseConfig)
     urg: UrgConfig = field(default_factory=UrgConfig)
+    depth: DepthConfig = field(default_factory=DepthConfig)
     scanner: HokuyoConfig = field(default_factory=HokuyoConfig)
 
 
@@ -75,12 +70,14 @@ class Simulator:
         *,
         gui: bool = False,
     ) -> None:
-        faults, config = faults or Faults(), config or SimConfig()
-        base_rng, urg_rng, kobuki_rng, hokuyo_rng, mover_rng = np.random.default_rng(seed).spawn(5)
+        faults = faults or world.faults or Faults()
+        config = _with_faults(config or SimConfig(), faults)
+        base_rng, urg_rng, kobuki_rng, hokuyo_rng, mover_rng, depth_rng = np.random.default_rng(seed).spawn(6)
         self.world = world
         self.config = config
         self.now_s = 0.0
         self.last_scan: Turn | None = None
+        self._gui = gui
         self._ticks = 0
         self._path_m = 0.0
         self._scene = Scene(world, gui=gui)
@@ -89,6 +86,7 @@ class Simulator:
         self.scanner = HokuyoFirmware(config.scanner)
         self._kobuki = Link("kobuki", faults.kobuki, kobuki_rng, lambda: self.now_s)
         self._hokuyo = Link("hokuyo", faults.hokuyo, hokuyo_rng, lambda: self.now_s)
+        self.camera = DepthCamera(self._scene, config.depth, depth_rng)
         self._motions = [mover.begin(int(mover_rng.integers(1 << 31))) for mover in world.movers]
 
     @property
@@ -126,6 +124,10 @@ class Simulator:
             room=self.world.truth.room_at(x, y, self.world.level_at(body.state.height_m)),
         )
 
+    def depth_image(self) -> NDArray[np.float32]:
+        """Return what the depth camera sees now, float32 (rows, columns), metres, NaN nothing."""
+        return self.camera.capture(self.base.body.state)
+
     def perfect_scan_m(self, state: BodyState) -> NDArray[np.float64]:
         """Return what a laser without noise would see from a place, float64 (682,), +inf beyond reach."""
         return self._urg.true_ranges_m(state)
@@ -140,6 +142,8 @@ class Simulator:
         packet = self.base.step(end, STEP_S)
         self._kobuki.deliver(packet, due + len(packet) * 10.0 / BIT_RATE + USB_S)
         after = self.base.body.state
+        if self._gui:
+            self._scene.show_robot(after.pose, after.height_m)
         self._path_m += math.hypot(after.x - before.x, after.y - before.y)
         scan = self._urg.step(begin, end, before, after, laser_on=self.scanner.laser_on)
         if scan is not None:
@@ -156,3 +160,12 @@ class Simulator:
         data = self._hokuyo.collect()
         if data:
             self._hokuyo.deliver(self.scanner.receive(data, now_s), now_s + USB_S)
+
+
+def _with_faults(config: SimConfig, faults: Faults) -> SimConfig:
+    body = replace(config.base.body, stuck_left=faults.stuck_left, stuck_right=faults.stuck_right)
+    return replace(
+        config,
+        base=replace(config.base, body=body),
+        urg=replace(config.urg, blocked=faults.blocked_laser),
+    )

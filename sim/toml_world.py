@@ -35,18 +35,17 @@ high = [7, 2]
 """
 
 import math
-import re
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 from sim import furniture
 from sim.errors import BadWorld
+from sim.faults import Faults, LinkFaults, Window
 from sim.floorplan import FloorPlan
 from sim.movers import Appearing, Person, SwingDoor
+from sim.toml_entry import KEYS, Entry
 from sim.world import Box, Pose2, Surface, World
 
 Area = tuple[float, float, float, float]
@@ -59,100 +58,6 @@ FURNITURE: dict[str, Callable[[float, float, float], list[Box]]] = {
     "sofa": furniture.sofa,
     "crate": lambda x, y, _yaw: furniture.bin_low(x, y),
 }
-KEYS: dict[str, tuple[frozenset[str], frozenset[str]]] = {
-    "": (frozenset({"name"}), frozenset({"spawn", "dock", "description"})),
-    "wall": (frozenset({"points"}), frozenset({"surface", "thickness", "height"})),
-    "room": (frozenset({"name", "low", "high"}), frozenset({"kind"})),
-    "door": (frozenset({"at", "rooms"}), frozenset({"name", "width", "leaf", "period"})),
-    "furniture": (frozenset({"kind", "at"}), frozenset({"moved"})),
-    "person": (frozenset({"points"}), frozenset({"speed", "pause"})),
-    "barrier": (frozenset({"from", "to", "during"}), frozenset()),
-    "ramp": (frozenset({"from", "to", "rise", "width"}), frozenset()),
-    "hole": (frozenset({"low", "high"}), frozenset()),
-}
-"""Table -> keys it must have, keys it may have."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """One table of the file, with what is needed to say where an error is."""
-
-    path: Path
-    text: str
-    table: str
-    number: int
-    values: dict[str, Any]
-
-    def line(self, key: str | None = None) -> int:
-        """Return the line of the table's header, or of a key in it."""
-        lines = self.text.splitlines()
-        start, seen = 0, -1
-        for index, line in enumerate(lines):
-            if self.table and re.match(rf"\s*\[\[\s*{re.escape(self.table)}\s*\]\]", line):
-                seen += 1
-                start = index
-                if seen == self.number:
-                    break
-        if key is None:
-            return start + 1
-        for index in range(start if self.table else 0, len(lines)):
-            if re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", lines[index]):
-                return index + 1
-        return start + 1
-
-    def refuse(self, reason: str, key: str | None = None) -> BadWorld:
-        """Return the error with file and line."""
-        where = f"[[{self.table}]] " if self.table else ""
-        return BadWorld(f"{self.path}:{self.line(key)}: {where}{reason}")
-
-    def check_keys(self) -> None:
-        must, may = KEYS[self.table]
-        for key in self.values:
-            if key not in must | may and not (not self.table and key in KEYS):
-                raise self.refuse(f"unknown key '{key}'; known are {', '.join(sorted(must | may))}", key)
-        for key in sorted(must - self.values.keys()):
-            raise self.refuse(f"key '{key}' is missing")
-
-    def numbers(self, key: str, count: int) -> tuple[float, ...]:
-        """Return a list of so many finite numbers."""
-        return self.checked(self.values[key], key, count)
-
-    def checked(self, value: object, key: str, count: int) -> tuple[float, ...]:
-        """Return value as so many finite numbers."""
-        good = isinstance(value, list) and len(value) == count
-        if not good or not all(_is_number(item) for item in value):  # type: ignore[attr-defined]
-            raise self.refuse(f"'{key}' must be {count} numbers, is {value!r}", key)
-        return tuple(float(item) for item in value)  # type: ignore[attr-defined]
-
-    def number_of(self, key: str, default: float, low: float, high: float) -> float:
-        """Return one number within limits."""
-        value = self.values.get(key, default)
-        if not _is_number(value) or not low <= value <= high:
-            raise self.refuse(f"'{key}' must be a number from {low:g} to {high:g}, is {value!r}", key)
-        return float(value)
-
-    def choice(self, key: str, default: str, allowed: list[str]) -> str:
-        """Return one of the allowed words."""
-        value = self.values.get(key, default)
-        if value not in allowed:
-            raise self.refuse(f"'{key}' must be one of {', '.join(allowed)}, is {value!r}", key)
-        return str(value)
-
-    def point(self, key: str) -> tuple[float, float]:
-        """Return x, y."""
-        x, y = self.numbers(key, 2)
-        return x, y
-
-    def points(self, key: str) -> list[tuple[float, float]]:
-        """Return at least two points."""
-        value = self.values[key]
-        if not isinstance(value, list) or len(value) < 2:
-            raise self.refuse(f"'{key}' must be a list of at least two points", key)
-        return [(x, y) for x, y in (self.checked(item, key, 2) for item in value)]
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def load_toml(path: Path, *, day: int = 0) -> World:
@@ -164,9 +69,9 @@ def load_toml(path: Path, *, day: int = 0) -> World:
         raise BadWorld(f"{path}: no such file") from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise BadWorld(f"{path}: not a readable TOML file ({error})") from error
-    top = _Entry(path, text, "", 0, document)
+    top = Entry(path, text, "", 0, document)
     top.check_keys()
-    entries = {table: _entries(top, table) for table in KEYS if table}
+    entries = {table: _entries(top, table) for table in KEYS if table and "faults" not in table}
     plan = FloorPlan(f"{path}")
     for table in ("wall", "room", "door"):
         for entry in entries[table]:
@@ -175,6 +80,8 @@ def load_toml(path: Path, *, day: int = 0) -> World:
         for entry in entries[table]:
             _ADD[table](plan, entry, day)
     _floors(plan, entries["ramp"], entries["hole"])
+    if "faults" in document:
+        plan.faults = _faults(top)
     if "dock" in document:
         plan.dock = _pose(top, "dock")
     spawn = _pose(top, "spawn") if "spawn" in document else None
@@ -184,22 +91,22 @@ def load_toml(path: Path, *, day: int = 0) -> World:
         raise BadWorld(f"{path}:{top.line('spawn')}: {str(error).removeprefix(f'{path}: ')}") from error
 
 
-def _pose(entry: _Entry, key: str) -> Pose2:
+def _pose(entry: Entry, key: str) -> Pose2:
     x, y, yaw = entry.numbers(key, 3)
     return x, y, yaw
 
 
-def _entries(top: _Entry, table: str) -> list[_Entry]:
+def _entries(top: Entry, table: str) -> list[Entry]:
     tables = top.values.get(table, [])
     if not isinstance(tables, list) or not all(isinstance(item, dict) for item in tables):
         raise top.refuse(f"write [[{table}]], one table each", table)
-    entries = [_Entry(top.path, top.text, table, index, item) for index, item in enumerate(tables)]
+    entries = [Entry(top.path, top.text, table, index, item) for index, item in enumerate(tables)]
     for entry in entries:
         entry.check_keys()
     return entries
 
 
-def _wall(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+def _wall(plan: FloorPlan, entry: Entry, _day: int) -> None:
     surface = Surface(entry.choice("surface", "wall", ["wall", "glass", "dark"]))
     for start, end in pairwise(entry.points("points")):
         if start == end:
@@ -213,14 +120,14 @@ def _wall(plan: FloorPlan, entry: _Entry, _day: int) -> None:
         )
 
 
-def _room(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+def _room(plan: FloorPlan, entry: Entry, _day: int) -> None:
     low, high = entry.point("low"), entry.point("high")
     if not (low[0] < high[0] and low[1] < high[1]):
         raise entry.refuse("'low' must lie left of and below 'high'", "low")
     plan.room(str(entry.values["name"]), low, high, kind=str(entry.values.get("kind", "room")))
 
 
-def _door(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+def _door(plan: FloorPlan, entry: Entry, _day: int) -> None:
     rooms = entry.values["rooms"]
     if not isinstance(rooms, list) or len(rooms) != 2:
         raise entry.refuse("'rooms' must be the names of two rooms", "rooms")
@@ -240,7 +147,7 @@ def _door(plan: FloorPlan, entry: _Entry, _day: int) -> None:
     plan.mover(SwingDoor((x0, y0), yaw, math.dist(*door.ends) - 0.02, period, share))
 
 
-def _furniture(plan: FloorPlan, entry: _Entry, day: int) -> None:
+def _furniture(plan: FloorPlan, entry: Entry, day: int) -> None:
     kind = entry.choice("kind", "", list(FURNITURE))
     x, y, yaw = entry.numbers("at", 3)
     moved = entry.values.get("moved", [])
@@ -254,7 +161,7 @@ def _furniture(plan: FloorPlan, entry: _Entry, day: int) -> None:
         plan.box(box)
 
 
-def _person(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+def _person(plan: FloorPlan, entry: Entry, _day: int) -> None:
     plan.mover(
         Person(
             tuple(entry.points("points")),
@@ -264,7 +171,7 @@ def _person(plan: FloorPlan, entry: _Entry, _day: int) -> None:
     )
 
 
-def _barrier(plan: FloorPlan, entry: _Entry, _day: int) -> None:
+def _barrier(plan: FloorPlan, entry: Entry, _day: int) -> None:
     (x0, y0), (x1, y1) = entry.point("from"), entry.point("to")
     begin_s, end_s = entry.numbers("during", 2)
     half = (max(math.hypot(x1 - x0, y1 - y0) / 2, 0.05), 0.05, 0.5)
@@ -272,7 +179,7 @@ def _barrier(plan: FloorPlan, entry: _Entry, _day: int) -> None:
     plan.mover(Appearing((box,), begin_s, end_s))
 
 
-_ADD: dict[str, Callable[[FloorPlan, _Entry, int], None]] = {
+_ADD: dict[str, Callable[[FloorPlan, Entry, int], None]] = {
     "wall": _wall,
     "room": _room,
     "door": _door,
@@ -282,7 +189,7 @@ _ADD: dict[str, Callable[[FloorPlan, _Entry, int], None]] = {
 }
 
 
-def _floors(plan: FloorPlan, ramps: list[_Entry], holes: list[_Entry]) -> None:
+def _floors(plan: FloorPlan, ramps: list[Entry], holes: list[Entry]) -> None:
     """Lay a floor with holes, and ramps on it; a world without both needs no floor."""
     if not ramps and not holes:
         return
@@ -299,7 +206,7 @@ def _floors(plan: FloorPlan, ramps: list[_Entry], holes: list[_Entry]) -> None:
         plan.box(_ramp(entry))
 
 
-def _ramp(entry: _Entry) -> Box:
+def _ramp(entry: Entry) -> Box:
     (x0, y0), (x1, y1) = entry.point("from"), entry.point("to")
     rise = entry.number_of("rise", 0.1, -5.0, 5.0)
     run = math.hypot(x1 - x0, y1 - y0)
@@ -324,3 +231,45 @@ def _without(area: Area, hole: Area) -> list[Area]:
         return [area]
     pieces = [(x0, y0, hx0, y1), (hx1, y0, x1, y1), (hx0, y0, hx1, hy0), (hx0, hy1, hx1, y1)]
     return [piece for piece in pieces if piece[0] < piece[2] and piece[1] < piece[3]]
+
+
+def _faults(top: Entry) -> Faults:
+    entry = _table(top, "faults", top.values["faults"])
+    return Faults(
+        kobuki=_link(_table(top, "faults.kobuki", entry.values.get("kobuki", {}))),
+        hokuyo=_link(_table(top, "faults.hokuyo", entry.values.get("hokuyo", {}))),
+        stuck_left=_window(entry, "stuck_left"),
+        stuck_right=_window(entry, "stuck_right"),
+        blocked_laser=_window(entry, "blocked_laser"),
+    )
+
+
+def _table(top: Entry, name: str, values: object) -> Entry:
+    if not isinstance(values, dict):
+        raise top.refuse(f"write [{name}], a table", name.rpartition(".")[2])
+    entry = Entry(top.path, top.text, name, 0, values)
+    entry.check_keys()
+    return entry
+
+
+def _link(entry: Entry) -> LinkFaults:
+    windows = entry.values.get("unplugged", [])
+    if not isinstance(windows, list):
+        raise entry.refuse("'unplugged' must be a list of [from, to] in seconds", "unplugged")
+    return LinkFaults(
+        lose_byte=entry.number_of("lose_byte", 0.0, 0.0, 1.0),
+        flip_bit=entry.number_of("flip_bit", 0.0, 0.0, 1.0),
+        burst_s=entry.number_of("burst_s", 0.0, 0.0, 1.0),
+        delay_s=entry.number_of("delay_s", 0.0, 0.0, 10.0),
+        jitter_s=entry.number_of("jitter_s", 0.0, 0.0, 10.0),
+        unplugged=tuple(_pair(entry, "unplugged", window) for window in windows),
+    )
+
+
+def _window(entry: Entry, key: str) -> Window | None:
+    return _pair(entry, key, entry.values[key]) if key in entry.values else None
+
+
+def _pair(entry: Entry, key: str, value: object) -> Window:
+    begin_s, end_s = entry.checked(value, key, 2)
+    return begin_s, end_s

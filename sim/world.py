@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.faults import Faults
+
 if TYPE_CHECKING:
     from sim.movers import Mover
 
@@ -145,6 +147,8 @@ class World:
     """False: there are ramps or holes, and wheels and cliff sensors must feel the floor."""
     level_height_m: float = 0.0
     """Height of one storey; 0 when there is only one."""
+    faults: Faults | None = None
+    """What goes wrong in a run in this world unless the run says otherwise."""
     description: str = ""
 
     def level_at(self, height_m: float) -> int:

@@ -36,8 +36,8 @@ from drivers.kobuki.events import KobukiSample
 from drivers.kobuki.session import KobukiSession
 from drivers.port import open_serial
 from sim import worlds
-from sim.link import LinkFaults
-from sim.simulator import Faults, Simulator
+from sim.faults import Faults, LinkFaults
+from sim.simulator import Simulator
 
 
 @contextlib.contextmanager

@@ -13,8 +13,8 @@ from robot.replay import replay_events, replay_map
 from robot.wire import HOKUYO, KOBUKI, RecordedHokuyoSession, RecordedKobukiSession, Wire
 from sim import worlds
 from sim.errors import Unplugged
-from sim.link import LinkFaults
-from sim.simulator import Faults, Simulator
+from sim.faults import Faults, LinkFaults
+from sim.simulator import Simulator
 
 
 def record(path, seconds):

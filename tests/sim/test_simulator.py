@@ -7,8 +7,8 @@ import pytest
 
 from sim import worlds
 from sim.errors import BadWorld, Unplugged
-from sim.link import LinkFaults
-from sim.simulator import Faults, Simulator
+from sim.faults import Faults, LinkFaults
+from sim.simulator import Simulator
 
 STREAM = b"MD0044072501000\n"
 

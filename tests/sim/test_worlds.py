@@ -106,19 +106,19 @@ def test_toml_world_is_built_and_furniture_moves_by_day(tmp_path):
         (
             'kind = "sofa"',
             'kind = "sofa"\ncolour = "red"',
-            r"home\.toml:22: \[\[furniture\]\] unknown key 'colour'",
+            r"home\.toml:22: \[furniture\] unknown key 'colour'",
         ),
         ("spawn = [1.0, 1.0, 0.0]", "spawn = [4.0, 0.5, 0.0]", r"home\.toml:3: spawn \(4, 0\.5\) overlaps"),
         (
             "at = [4.0, 2.5]",
             "at = [5.0, 2.5]",
-            r"home\.toml:17: \[\[door\]\] door 'door 1' .* lies in no wall",
+            r"home\.toml:17: \[door\] door 'door 1' .* lies in no wall",
         ),
         ('kind = "sofa"', 'kind = "boat"', r"home\.toml:21: .*'kind' must be one of cabinet"),
         ("low = [4, 0]", "low = [nan, 0]", r"home\.toml:14: .*'low' must be 2 numbers"),
         ('name = "home"', "name = ", r"home\.toml: not a readable TOML file"),
         ('name = "home"', 'name = "home"\nghosts = 3', r"home\.toml:3: unknown key 'ghosts'"),
-        ('rooms = ["kitchen", "hall"]', "", r"home\.toml:16: \[\[door\]\] key 'rooms' is missing"),
+        ('rooms = ["kitchen", "hall"]', "", r"home\.toml:16: \[door\] key 'rooms' is missing"),
     ],
 )
 def test_bad_world_files_are_one_line_with_file_and_place(tmp_path, before, after, complaint):
