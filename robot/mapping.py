@@ -35,6 +35,7 @@ class MappingStep:
         """How many scans went into the map."""
         self._exchange = exchange
         self._lost = False
+        self._associated_id = 0
 
     def step(self, timed: TimedScan) -> None:
         """Map one scan and publish what is known now."""
@@ -44,6 +45,9 @@ class MappingStep:
         self.mapper.update(update, self.slam.view(), timed.sighting.hits_base)
         self.scans += 1
         view = self.mapper.view(self.slam.particles())
+        if view.associated_id != self._associated_id:
+            self._associated_id = view.associated_id
+            self.mapper.store.commit()  # who plans from a node must find it and its edges in the file
         self._exchange.map_view.put(view)
         if view.lost != self._lost:
             self._lost = view.lost

@@ -42,6 +42,7 @@ class NavigationStep:
             return
         if self._graph is None:
             self._graph = self._open_graph()
+        _ = self._graph.version  # asked once a cycle: here the reader forgets what has changed
         output = self.navigator.step(
             view,
             self._graph,
