@@ -1,6 +1,7 @@
 """Commands that drive a robot, real or simulated, and look at what it did."""
 
 import math
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,22 @@ import typer
 from robot.cli_help import add
 
 MISSIONS = "explore, tour, goto:PLACE (a node's number, its name, far, start), several joined by commas"
+
+Mission = Annotated[str, typer.Option(metavar="WHAT", help=MISSIONS)]
+Kobuki = Annotated[str | None, typer.Option(metavar="PORT", help="the base; default: found by USB identity")]
+Hokuyo = Annotated[str | None, typer.Option(metavar="PORT", help="the laser; default: found by USB identity")]
+MapFile = Annotated[
+    Path | None, typer.Option("--map", metavar="FILE.lemto", help="map to go on with, or to make")
+]
+Out = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="folder for the results; default runs/DATE_TIME")
+]
+Config = Annotated[
+    Path | None, typer.Option(metavar="FILE.toml", help="settings that differ from the defaults")
+]
+Duration = Annotated[
+    float, typer.Option(metavar="S", min=1.0, help="end at the latest after this many seconds")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -31,9 +48,27 @@ def register(app: typer.Typer) -> None:
     )
     add(
         app,
+        goto,
+        "lemtomap goto kitchen --map office.lemto",
+        "lemtomap goto 12 --map office.lemto",
+    )
+    add(
+        app,
+        teleop,
+        "lemtomap teleop                                     drive by the keyboard, mapping on the way",
+    )
+    add(app, record, "lemtomap record --out runs/carried                  the robot stands or is pushed")
+    add(
+        app,
+        replay,
+        "lemtomap replay runs/demo --out runs/again",
+        "lemtomap replay runs/demo --out runs/window --slam window",
+    )
+    add(
+        app,
         view,
         "lemtomap view runs/demo",
-        "lemtomap view runs/demo --web        on a machine without a display",
+        "lemtomap view runs/demo --web                       on a machine without a display",
     )
 
 
@@ -45,13 +80,8 @@ def sim(
             metavar="NAME|FILE", help="a built-in world ('list' shows them), or a .yaml or .toml file"
         ),
     ] = "office",
-    mission: Annotated[
-        str,
-        typer.Option(metavar="WHAT", help=MISSIONS),
-    ] = "explore,goto:far,goto:start",
-    duration: Annotated[
-        float, typer.Option(metavar="S", min=1.0, help="end at the latest after this many seconds")
-    ] = 900.0,
+    mission: Mission = "explore,goto:far,goto:start",
+    duration: Duration = 900.0,
     fast: Annotated[
         bool, typer.Option("--fast", help="lock-step on a virtual clock, as fast as the machine can")
     ] = False,
@@ -98,37 +128,86 @@ def list_worlds(out: Path) -> str:
 
 def run(
     *,
-    kobuki: Annotated[
-        str | None, typer.Option(metavar="PORT", help="the base; default: found by USB identity")
-    ] = None,
-    hokuyo: Annotated[
-        str | None, typer.Option(metavar="PORT", help="the laser; default: found by USB identity")
-    ] = None,
-    map_file: Annotated[
-        Path | None, typer.Option("--map", metavar="FILE.lemto", help="map to go on with, or to make")
-    ] = None,
-    mission: Annotated[str, typer.Option(metavar="WHAT", help=MISSIONS)] = "explore",
-    duration: Annotated[
-        float, typer.Option(metavar="S", min=1.0, help="end at the latest after this many seconds")
-    ] = 1e6,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="folder for the results; default runs/DATE_TIME")
-    ] = None,
-    config: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help="settings that differ from the defaults")
-    ] = None,
+    kobuki: Kobuki = None,
+    hokuyo: Hokuyo = None,
+    map_file: MapFile = None,
+    mission: Mission = "explore",
+    duration: Duration = math.inf,
+    out: Out = None,
+    config: Config = None,
     seed: Annotated[int, typer.Option(metavar="N", help="of the particles")] = 0,
 ) -> None:
     """Run the real robot: map, explore, drive to places. Ctrl-C stops it and writes the results."""
+    from robot.robot_run import RobotOptions
+
+    _drive("run", RobotOptions(mission, duration, kobuki, hokuyo, map_file, out, config, seed))
+
+
+def goto(
+    place: Annotated[str, typer.Argument(metavar="PLACE", help="a node's number, its name, far, start")],
+    map_file: Annotated[
+        Path, typer.Option("--map", metavar="FILE.lemto", help="the map that knows the place")
+    ],
+    *,
+    kobuki: Kobuki = None,
+    hokuyo: Hokuyo = None,
+    out: Out = None,
+    config: Config = None,
+) -> None:
+    """Drive the real robot to a place of a map."""
+    from robot.robot_run import RobotOptions
+
+    if not map_file.exists():
+        raise typer.BadParameter(f"{map_file}: no such map file", param_hint="--map")
+    _drive("goto", RobotOptions(f"goto:{place}", math.inf, kobuki, hokuyo, map_file, out, config))
+
+
+def teleop(
+    *,
+    kobuki: Kobuki = None,
+    hokuyo: Hokuyo = None,
+    map_file: MapFile = None,
+    out: Out = None,
+    config: Config = None,
+) -> None:
+    """Drive the real robot by the keyboard: arrows or w a s d, space stops, q ends; it maps on the way."""
+    from robot.robot_run import RobotOptions
+
+    _drive("teleop", RobotOptions("idle", math.inf, kobuki, hokuyo, map_file, out, config, by_hand=True))
+
+
+def record(
+    *,
+    kobuki: Kobuki = None,
+    hokuyo: Hokuyo = None,
+    duration: Duration = math.inf,
+    out: Out = None,
+    config: Config = None,
+) -> None:
+    """Record both devices' bytes, and map, without driving; 'lemtomap replay' maps the recording anew."""
+    from robot.robot_run import RobotOptions
+
+    _drive("record", RobotOptions("idle", duration, kobuki, hokuyo, None, out, config))
+
+
+def replay(
+    recording: Annotated[Path, typer.Argument(metavar="RUN", help="a run's folder, or its run.mcap")],
+    *,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="folder for the results; default runs/replay_DATE_TIME")
+    ] = None,
+    slam: Annotated[str, typer.Option(help="rolling, gmapping or window")] = "rolling",
+    seed: Annotated[int, typer.Option(metavar="N", help="of the particles")] = 0,
+) -> None:
+    """Feed a recorded run's bytes through the same drivers and map it anew, as fast as the machine can."""
     from robot.progress import progress_bar
-    from robot.robot_run import RobotOptions, run_robot
+    from robot.replay_run import replay_run
     from robot.told import told_after_run
 
-    options = RobotOptions(mission, duration, kobuki, hokuyo, map_file, out, config, seed)
-    with progress_bar("run") as bar:
-        folder, summary = run_robot(options, bar)
+    folder = out or Path("runs") / f"replay_{datetime.now(UTC).astimezone():%Y-%m-%d_%H-%M-%S}"
+    with progress_bar("replay") as bar:
+        summary = replay_run(recording, folder, bar, slam=slam, seed=seed)
     typer.echo(told_after_run(folder, summary))
-    raise typer.Exit(summary["result"] == "failed")
 
 
 def view(
@@ -142,3 +221,16 @@ def view(
     from robot.view import open_recording
 
     open_recording(path, web=web)
+
+
+def _drive(name: str, options: object) -> None:
+    """Run the real robot and tell what came of it."""
+    from robot.progress import progress_bar
+    from robot.robot_run import RobotOptions, run_robot
+    from robot.told import told_after_run
+
+    assert isinstance(options, RobotOptions)  # noqa: S101 - typed loosely, so that the import stays in here
+    with progress_bar(name) as bar:
+        folder, summary = run_robot(options, bar)
+    typer.echo(told_after_run(folder, summary))
+    raise typer.Exit(summary["result"] == "failed")

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,7 @@ from robot.missions import parse_mission
 from robot.progress import Bar
 from robot.run import Run, RunPlan, Teller
 from robot.runtime import Ports, Runtime
+from robot.teleop import driven_by_hand
 from robot.warmup import warm_up
 
 
@@ -35,6 +37,8 @@ class RobotOptions:
     config: Path | None = None
     seed: int = 0
     slam: str = "rolling"
+    by_hand: bool = False
+    """Drive by the keyboard, over whatever the mission wants."""
 
 
 def run_robot(options: RobotOptions, bar: Bar) -> tuple[Path, dict[str, Any]]:
@@ -60,8 +64,16 @@ def run_robot(options: RobotOptions, bar: Bar) -> tuple[Path, dict[str, Any]]:
     with Run(plan, Teller(bar, options.duration_s)) as run:
         warm_up(plan.config, options.slam)
         runtime = Runtime(run.core, Ports(_opener(found.kobuki), _opener(found.hokuyo)), run.files)
-        run.end(runtime.run(mission, options.duration_s))
+        with _hands(options, runtime):
+            run.end(runtime.run(mission, options.duration_s))
     return out, run.summary
+
+
+def _hands(options: RobotOptions, runtime: Runtime) -> AbstractContextManager[None]:
+    """Return what lets a person drive, or nothing."""
+    if not options.by_hand:
+        return nullcontext()
+    return driven_by_hand(runtime.core.base.teleop, runtime.clock.now_s, runtime.stop.set)
 
 
 def find_ports(config: PortsConfig, options: RobotOptions) -> PortsConfig:
