@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.errors import LemtomapError
-from lemtomap.se2 import Pose, adjoint, compose
+from lemtomap.se2 import Pose, adjoint, compose, inverse
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import NavEvent
@@ -18,6 +18,7 @@ from lemtomap.topo.learning import learn
 from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.neighbours import NeighbourFinder, in_sight
 from lemtomap.topo.paging import PagedGraph
+from lemtomap.topo.stand import last_stand, put_last_stand
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
 from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
@@ -86,7 +87,11 @@ class TopoMapper:
         *,
         level: int = 0,
         recogniser: Recogniser | None = None,
+        resume: bool = False,
     ) -> None:
+        """Go on with the store's map. `resume`: the robot stands where it stood when the map was closed;
+        otherwise it starts a new part of the graph, which a closure joins to the rest.
+        """
         self.config = config
         self.store = store
         self.graph = PagedGraph(store, config.paged_nodes)
@@ -98,6 +103,7 @@ class TopoMapper:
         self.travelled_m = 0.0
         """Way of the base since the start, metres."""
         self._recogniser = recogniser
+        self._resume = resume
         self._neighbours = NeighbourFinder(config)
         self._associated_id = 0
         self._drift: Covariance = np.zeros((3, 3))
@@ -139,7 +145,7 @@ class TopoMapper:
         before, self._now = self._now, _Now(slam, grid)
         self.keeper.observe(slam.T_grid_base, points_base)
         if before is None:
-            self._birth()
+            self._begin()
         else:
             self._move(before.slam, slam)
             if grid is not before.grid:
@@ -153,6 +159,19 @@ class TopoMapper:
         self.store.tick(slam.stamp_s)
 
     # -- the steps of Figure 3-6 ----------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        """Stand where the map was left, or on a first node."""
+        left = last_stand(self.store) if self._resume else None
+        if left is None:
+            self._birth()
+            return
+        node_id, T_node_base = left
+        slam = self._require().slam
+        T_grid_node = compose(slam.T_grid_base, inverse(T_node_base))
+        self.local.anchor(node_id, T_grid_node, _relative_to_window(slam))
+        self._associated_id = node_id
+        self._align_associated()
 
     def _move(self, before: SlamUpdate, after: SlamUpdate) -> None:
         """Let the covariance of T_node_base grow by the motion since the previous scan."""
@@ -390,8 +409,7 @@ class TopoMapper:
         """Write everything and close the map file; the trail stays readable."""
         if self._now is not None:
             self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
-            self.store.set_meta("associated_id", self._associated_id)
-            self.store.set_meta("T_node_base", " ".join(repr(float(v)) for v in self.T_node_base))
+            put_last_stand(self.store, self._associated_id, self.T_node_base)
         self.store.close()
 
     def _require(self) -> _Now:
