@@ -13,9 +13,11 @@ from robot.exchange import Note
 from robot.final_map import FinalMap, final_map
 from robot.onlooker import Onlooker
 from robot.overview import Overview, WallSketch, draw
+from robot.preview import draw_preview
 from robot.recording import Recorder
 from robot.viewer import Viewer
 
+PREVIEW_PERIOD_S = 15.0
 WALLS_PERIOD_S = 0.5  # of the scans that draw the walls in the picture
 RESULTS = ("trajectory.tum", "grid.pgm", "grid.yaml", "overview.png", "summary.json", "run.rrd", "run.mcap")
 
@@ -47,7 +49,7 @@ class RunFiles(Onlooker):
         self._out, self._title, self._core, self._listener = out, title, core, listener
         self._begun = _Clock()
         self._walls = WallSketch()
-        self._walls_due_s = 0.0
+        self._walls_due_s, self._preview_due_s = 0.0, PREVIEW_PERIOD_S
         viewer = Viewer(out / "run.rrd", live=live)
         recorder = Recorder(out / "run.mcap", {"title": title})
         super().__init__(core.exchange, core.efforts, viewer, recorder, listener.say)
@@ -56,7 +58,10 @@ class RunFiles(Onlooker):
         """Show and record what is new; now and then keep a scan for the picture."""
         super().look(now_s)
         self._listener.look(now_s)
-        scan = self._core.exchange.last_scan.get()
+        view, scan = self._core.exchange.map_view.get(), self._core.exchange.last_scan.get()
+        if view is not None and now_s >= self._preview_due_s:
+            self._preview_due_s = now_s + PREVIEW_PERIOD_S
+            draw_preview(self._out / "overview.png", view)
         if scan is not None and now_s >= self._walls_due_s:
             self._walls_due_s = now_s + WALLS_PERIOD_S
             self._walls.add(scan.scan.stamp_s, scan.sighting.hits_base)
