@@ -14,6 +14,7 @@ import numpy as np
 from drivers.hokuyo.events import LaserScan
 from drivers.hokuyo.session import HokuyoEvent
 from drivers.kobuki.battery import Level as BatteryLevel
+from drivers.kobuki.docking import Docking
 from drivers.kobuki.events import BumperEvent, CliffEvent, KobukiSample, LinkUp
 from drivers.kobuki.session import KobukiEvent
 from lemtomap.nav.types import NavState
@@ -27,7 +28,7 @@ from robot.feedback import Condition, Indicators, Signal
 from robot.notes import describe_event
 from robot.reflex import Retreat
 from robot.safety import Allowed, Evidence, Reason, SafetyGate, Sides
-from robot.velocity import NAVIGATION, SAFETY, TELEOP, VelocityMux, VelocitySmoother
+from robot.velocity import DOCKING, NAVIGATION, SAFETY, TELEOP, VelocityMux, VelocitySmoother
 
 SCAN_PATIENCE_S = 0.3  # a scan whose odometry has not come by then belongs to a silent base
 
@@ -51,6 +52,7 @@ class BaseStep:
         self._buffer = OdometryBuffer()
         self._mux, self._smoother = VelocityMux(), VelocitySmoother(config.smoother)
         self._retreat, self._indicators = Retreat(), Indicators()
+        self._docking: Docking | None = None
         self._sample: KobukiSample | None = None
         self._last: Odometry | None = None
         self._scan: TimedScan | None = None
@@ -87,6 +89,21 @@ class BaseStep:
         )
         self._buffer.add(self._last)
         self._exchange.odometry.put(self._last)
+        self._dock(sample)
+
+    def _dock(self, sample: KobukiSample) -> None:
+        """Drive onto the charging dock while somebody wants it; each wish is a new attempt."""
+        if not self._exchange.dock.get():
+            self._docking = None
+            self._mux.withdraw(DOCKING)
+            return
+        self._docking = self._docking or Docking()
+        output = self._docking.step(sample)
+        self._exchange.docking.put(output)
+        if output.finished:
+            self._mux.withdraw(DOCKING)
+        else:
+            self._mux.offer(DOCKING, Twist(output.v_mps, output.w_radps), sample.arrival_s)
 
     def _take_event(self, event: KobukiEvent, now_s: float) -> None:
         contact = bridge.contact_of(event)

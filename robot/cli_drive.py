@@ -9,7 +9,7 @@ import typer
 
 from robot.cli_help import add
 
-MISSIONS = "explore, tour, goto:PLACE (a node's number, its name, far, start), several joined by commas"
+MISSIONS = "explore, tour, goto:PLACE (a node's number, its name, far, start), dock, several joined by commas"
 
 Mission = Annotated[str, typer.Option(metavar="WHAT", help=MISSIONS)]
 Kobuki = Annotated[str | None, typer.Option(metavar="PORT", help="the base; default: found by USB identity")]

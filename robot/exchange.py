@@ -10,6 +10,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.kobuki.docking import DockingOutput
 from lemtomap.nav.types import Contact, NavOutput, Sighting
 from lemtomap.topo.events import NavEvent
 from lemtomap.types import MapView, Odometry, Scan
@@ -109,6 +110,10 @@ class Exchange:
         self.nav_events: BoundedQueue[NavEvent] = BoundedQueue("events for the mapper", EVENTS_WAITING)
         self.map_view: Latest[MapView] = Latest()
         self.nav_output: Latest[NavOutput] = Latest()
+        self.dock: Latest[bool] = Latest()
+        """True: drive onto the charging dock."""
+        self.docking: Latest[DockingOutput] = Latest()
+        """How that stands."""
         self.base_status: Latest[BaseStatus] = Latest()
         self.mission: Latest[MissionStatus] = Latest()
         self.notes: BoundedQueue[Note] = BoundedQueue("notes for the user", EVENTS_WAITING)

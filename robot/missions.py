@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from drivers.kobuki.docking import DockingOutput, DockingState
 from lemtomap.errors import BadSetting
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.explore.explorer import Explorer
@@ -34,6 +35,8 @@ class Moment:
     output: NavOutput
     navigator: Navigator
     T_odom_base: Pose
+    docking: DockingOutput | None = None
+    """How the drive onto the dock stands, once it has begun."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,8 @@ class Order:
     """A new goal for the navigator."""
     cancel: bool = False
     events: Sequence[NavEvent] = field(default=())
+    dock: bool = False
+    """Drive onto the charging dock now."""
 
 
 class Mission(Protocol):
@@ -88,6 +93,28 @@ class GoTo:
             why = moment.output.text or str(moment.output.reason)
             return Order(MissionState.FAILED, f"{self.place} not reached: {why}")
         return Order(MissionState.RUNNING, f"going to {self.place}")
+
+
+class Dock:
+    """Drive onto the charging dock, which must be in sight from here; done when the charger says so."""
+
+    def __init__(self) -> None:
+        self._before: DockingOutput | None = None
+        self._begun = False
+
+    def step(self, moment: Moment) -> Order:
+        """Hand the wheels over and wait for the verdict."""
+        if not self._begun:
+            self._begun, self._before = True, moment.docking
+            return Order(MissionState.RUNNING, "docking", cancel=True, dock=True)
+        output = moment.docking
+        if output is None or output is self._before:
+            return Order(MissionState.RUNNING, "docking", dock=True)
+        if output.state is DockingState.DOCKED:
+            return Order(MissionState.DONE, "docked and charging")
+        if output.state is DockingState.FAILED:
+            return Order(MissionState.FAILED, f"not docked: {output.reason}")
+        return Order(MissionState.RUNNING, f"docking: {output.state}", dock=True)
 
 
 class Explore:
@@ -158,7 +185,7 @@ def farthest_node(graph: RouteGraph, start_id: int, at_most: int = 100_000) -> i
 
 
 def parse_mission(text: str) -> Mission:
-    """Return the mission meant by `explore`, `tour`, `goto:PLACE`, or several joined by commas."""
+    """Return the mission meant by `explore`, `tour`, `goto:PLACE`, `dock`, or several joined by commas."""
     missions = [_parse_one(part.strip()) for part in text.split(",")]
     return missions[0] if len(missions) == 1 else Series(missions)
 
@@ -169,6 +196,10 @@ def _parse_one(text: str) -> Mission:
         return GoTo(place)
     if text == "explore":
         return Explore()
+    if text == "dock":
+        return Dock()
     if text == "idle":
         return Idle()
-    raise BadSetting(f"mission '{text}': must be explore, tour, goto:PLACE, or several joined by commas")
+    raise BadSetting(
+        f"mission '{text}': must be explore, tour, goto:PLACE, dock, or several joined by commas"
+    )

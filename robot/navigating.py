@@ -55,7 +55,17 @@ class NavigationStep:
         for event in output.events:
             self._exchange.nav_events.put(event)
         self._exchange.nav_output.put(output)
-        self._follow_mission(Moment(now_s, view, self._graph, output, self.navigator, odometry.T_odom_base))
+        self._follow_mission(
+            Moment(
+                now_s,
+                view,
+                self._graph,
+                output,
+                self.navigator,
+                odometry.T_odom_base,
+                self._exchange.docking.get(),
+            )
+        )
 
     def _follow_mission(self, moment: Moment) -> None:
         if self._status.state.over:
@@ -68,6 +78,8 @@ class NavigationStep:
             self.navigator.cancel()
         for event in order.events:
             self._exchange.nav_events.put(event)
+        if order.dock is not bool(self._exchange.dock.get()):
+            self._exchange.dock.put(order.dock)
         if (order.state, order.text) != (self._status.state, self._status.text):
             level = Level.WARN if order.state is MissionState.FAILED else Level.INFO
             self._exchange.note(now_s, "mission", order.text or str(order.state), level)

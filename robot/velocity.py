@@ -23,8 +23,9 @@ class Source:
 
 SAFETY = Source("safety", 100, 0.3)
 TELEOP = Source("teleop", 50, 0.5)
+DOCKING = Source("docking", 30, 0.3)
 NAVIGATION = Source("navigation", 10, 0.3)
-SOURCES = (SAFETY, TELEOP, NAVIGATION)
+SOURCES = (SAFETY, TELEOP, DOCKING, NAVIGATION)
 
 
 @dataclass(frozen=True, slots=True)
