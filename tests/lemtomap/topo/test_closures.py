@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+
+from lemtomap.se2 import between, compose, pose
+from lemtomap.topo.align import Match
+from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed, OpeningDone, OpeningSeen
+from lemtomap.topo.graph import OpeningState, Place
+from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.reader import TopoReader
+from lemtomap.topo.store import TopoStore
+from lemtomap.types import EdgeType
+from tests.lemtomap.topo.drive import lead, room, said
+
+SURE = np.diag([1e-4, 1e-4, 1e-5])
+CORRIDORS = [(-9, -9), (9, -9), (9, 9), (-9, 9), (-9, -8.2)]
+
+
+@pytest.fixture
+def loop(tmp_path):
+    """A round of 72 m whose grid frame drifted, its end beside its start but further than D_nn over edges."""
+    config = TopoConfig(local_radius_m=20.0)
+    mapper = TopoMapper(config, TopoStore.create(tmp_path / "map.lemto"))
+    lead(mapper, CORRIDORS, room(40.0, origin_m=(-20, -20)))
+    yield mapper
+    mapper.close()
+
+
+def test_a_round_longer_than_d_nn_stays_open_until_a_closure_joins_it(loop):
+    last = loop.associated_id
+    assert 1 not in loop.view().T_grid_node
+    truth = between(loop.local.standings[last].T_grid_node, pose(-9, -9, 0))
+    edge = loop.close_loop(last, 1, truth, SURE)
+    assert edge.type is EdgeType.LOOP_CLOSING
+    view = loop.view()
+    np.testing.assert_allclose(view.T_grid_node[1], [-9, -9, 0], atol=1e-9)
+    assert {1, 2, 3} <= set(view.T_grid_node)
+    loop.store.commit()
+    with TopoReader(loop.store.path) as reader:
+        assert 1 in {each.other_id for each in reader.edges_of(last)}
+
+
+def test_a_revoked_closure_leaves_nothing_behind(loop):
+    last, before = loop.associated_id, loop.view().T_grid_node
+    wrong = loop.close_loop(last, 30, pose(0.5, 0.5, 1.0), SURE)
+    loop.revoke(wrong.edge_id)
+    loop.revoke(wrong.edge_id)  # once more does no harm
+    assert loop.store.edge(wrong.edge_id) is None
+    after = loop.view().T_grid_node
+    assert set(after) == set(before)
+    for node_id, T in before.items():
+        np.testing.assert_allclose(after[node_id], T, atol=1e-6)
+
+
+def test_carried_elsewhere_a_new_part_begins_and_a_closure_joins_it(loop):
+    nodes = loop.store.count("node")
+    first = loop.start_component()
+    assert first == nodes + 1
+    assert set(loop.view().T_grid_node) == {first}
+    stamp = lead(loop, [(-9, -8.2), (-5, -8.2)], room(40.0, origin_m=(-20, -20)), start_s=1000.0)
+    last = loop.associated_id
+    loop.close_loop(last, 5, between(loop.local.standings[last].T_grid_node, pose(-4.6, -9, 0)), SURE)
+    assert {1, 5, first, last} <= set(loop.view().T_grid_node)
+    lead(loop, [(-5, -8.2), (-4.6, -8.8)], room(40.0, origin_m=(-20, -20)), start_s=stamp)
+    assert loop.associated_id == 5
+
+
+def test_a_known_place_recognised_becomes_the_associated_node(loop):
+    at = loop.now[0].T_grid_base
+    loop.relocate(7, compose(at, [0.2, 0.0, 0.0]), SURE)
+    assert loop.associated_id == 7
+    np.testing.assert_allclose(loop.T_node_base, [-0.2, 0, 0], atol=1e-9)
+
+
+def test_the_robot_goes_on_from_where_the_map_was_closed(tmp_path):
+    path = tmp_path / "map.lemto"
+    mapper = TopoMapper(TopoConfig(), TopoStore.create(path))
+    lead(mapper, [(-2, 0), (2.3, 0)], room())
+    here, T_node_base = mapper.associated_id, mapper.T_node_base
+    mapper.close()
+    again = TopoMapper(TopoConfig(), TopoStore.open(path), resume=True)
+    again.update(said(0.0, pose(5, 5, 1.0)), room())
+    assert again.associated_id == here
+    np.testing.assert_allclose(again.T_node_base, T_node_base, atol=1e-9)
+    again.close()
+    elsewhere = TopoMapper(TopoConfig(), TopoStore.open(path))
+    elsewhere.update(said(0.0, pose(5, 5, 1.0)), room())
+    assert elsewhere.associated_id == elsewhere.store.count("node") > here
+    elsewhere.close()
+
+
+def test_one_glance_at_a_changed_place_renews_nothing_but_several_visits_do(tmp_path):
+    mapper = TopoMapper(TopoConfig(), TopoStore.create(tmp_path / "map.lemto"))
+    stamp = lead(mapper, [(-5, 0), (2, 0)], room(walls=[(-6, 1, 6, 1.2), (-6, -1.2, 6, -1)]))
+    taken = mapper.store.place(1)
+    assert taken is not None
+    changed, same = (Match(pose(0, 0, 0), SURE, score) for score in (0.65, 0.95))
+    limit = mapper.config.place_stale_visits
+    for match in [changed] * (limit - 1) + [same] + [changed] * (limit - 1):
+        mapper.keeper.compare(1, match)
+    stamp = lead(mapper, [(2, 0), (2.9, 0)], room(), start_s=stamp)
+    assert mapper.store.place(1) == taken
+    mapper.keeper.compare(1, changed)
+    lead(mapper, [(2.9, 0), (5, 0)], room(walls=[(-6, 2, 6, 2.2)]), start_s=stamp)
+    renewed = mapper.store.place(1)
+    assert isinstance(renewed, Place)
+    assert renewed.taken_s > taken.taken_s
+    mapper.close()
+
+
+def test_navigation_teaches_times_blocks_bumps_and_openings(loop):
+    store = loop.store
+    edge = loop.graph.edge_between(1, 2)
+    loop.apply(EdgeTraversed(1, 2, 5.0))
+    assert store.edge(edge.edge_id).time_s == 5.0
+    loop.apply(EdgeTraversed(2, 1, 3.0))
+    assert 3.0 < store.edge(edge.edge_id).time_s < 5.0
+    loop.apply(EdgeBlocked(2, 1, 77.0))
+    assert store.edge(edge.edge_id).blocked_until_s == 77.0
+    loop.apply(EdgeBlocked(1, 40, 77.0))  # no such edge: nothing to learn
+    here = loop.associated_id
+    loop.apply(Bumped("bump", 0.2, 0.0, 9.0))
+    (mark,) = store.marks_of(here)
+    at = compose(loop.T_node_base, [0.2, 0.0, 0.0])
+    assert (mark.x_m, mark.y_m) == pytest.approx((at[0], at[1]))
+    loop.apply(OpeningSeen(1, here, 2.0, 0.0, 0.1, 0.9))
+    loop.apply(OpeningDone(1, closed=True))
+    assert [(o.node_id, o.state) for o in store.placeholders()] == [(here, OpeningState.CLOSED)]
