@@ -113,6 +113,18 @@ class RouteEdge:
     """The edge is closed to planning while now_s is below this."""
 
 
+@dataclass(frozen=True, slots=True)
+class EdgeTable:
+    """Edges in columns of equal length."""
+
+    edge_id: NDArray[np.int64]
+    source_id: NDArray[np.int64]
+    target_id: NDArray[np.int64]
+    length_m: NDArray[np.float32]
+    time_s: NDArray[np.float32]
+    blocked_until_s: NDArray[np.float64]
+
+
 class RouteGraph(Protocol):
     """The topological map as a planner sees it; also of maps far larger than memory."""
 

@@ -62,6 +62,7 @@ class RouteConfig:
 
     usual_speed_mps: float = 0.4  # what an edge without a learnt time is expected to take
     learnt_weight: float = 0.5  # share of learnt time against length over usual speed
+    large_nodes: int = 3000  # from here on flat arrays are worth their building
     bucket_s: float = 1.0  # about the least price of an edge: then few nodes are corrected
 
 

@@ -20,8 +20,8 @@ from lemtomap.nav.metric import MetricPlan, Reach, plan_to, reach_from
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
 from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
-from lemtomap.nav.route.fresh import FreshGraph
-from lemtomap.nav.route.planner import Route, plan_route
+from lemtomap.nav.route.planner import Route
+from lemtomap.nav.route.planning import RoutePlanner
 from lemtomap.nav.sliding import BORDER_M, Target, choose_target, find_barrier, find_detour, place_of
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
@@ -68,6 +68,7 @@ class Navigator:
         self._costmap_view: CostmapView | None = None
         self._goal: Goal | None = None
         self._end: tuple[NavState, Reason, str] = (NavState.IDLE, Reason.NONE, "no goal")
+        self._routes = RoutePlanner(self.config.route)
         self._route: Route | None = None
         self._route_version: int | None = None
         self._closed: dict[int, float] = {}
@@ -190,8 +191,7 @@ class Navigator:
             self._route = route.since(here)
             return self._route
         self._closed = {edge: until for edge, until in self._closed.items() if until > moment.now_s}
-        fresh = FreshGraph(graph, moment.map_view, self.config.route.usual_speed_mps)
-        route = plan_route(fresh, here, goal.node_id, moment.now_s, self.config.route, self._closed)
+        route = self._routes.plan(graph, moment.map_view, goal.node_id, moment.now_s, self._closed)
         self._route, self._route_version = route, graph.version
         return route
 

@@ -1,19 +1,23 @@
 """The map as the navigation thread sees it: its own read-only connection, always the last committed state."""
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
+
+import numpy as np
 
 from lemtomap.topo import schema
 from lemtomap.topo.graph import USUAL_SPEED_MPS
 from lemtomap.topo.rows import planar_length_m
-from lemtomap.types import RouteEdge
+from lemtomap.types import EdgeTable, RouteEdge
 
 _NEIGHBOURS = (
     "SELECT id, target, time, blocked, measure FROM edge WHERE source = ?1 "
     "UNION ALL SELECT id, source, time, blocked, measure FROM edge WHERE target = ?1"
 )
+_ALL_EDGES = "SELECT id, source, target, time, blocked, measure FROM edge"
+_EDGES_AT = _ALL_EDGES + " WHERE source = ?1 OR target = ?1"
 CACHED_NODES = (
     200_000  # some 500 bytes each: at most about 100 MB, reached only by planning across such a map
 )
@@ -81,6 +85,32 @@ class TopoReader:
             edges.append(RouteEdge(edge_id, other_id, length_m, expected_s, blocked_s or 0.0))
         return tuple(edges)
 
+    def node_count(self) -> int:
+        """Return about how many nodes the map has: the largest ID, which costs nothing to find."""
+        with schema.guarded(self.path):
+            return int(self._db.execute("SELECT coalesce(max(id), 0) FROM node").fetchone()[0])
+
+    def edge_table(self, node_ids: Iterable[int] | None = None) -> EdgeTable:
+        """Return all edges, or those at some nodes, in columns: for planning across a large map."""
+        with schema.guarded(self.path):
+            if node_ids is None:
+                rows = self._db.execute(_ALL_EDGES).fetchall()
+            else:
+                found = {}  # an edge is met from both its ends
+                for node_id in set(node_ids):
+                    found.update((row[0], row) for row in self._db.execute(_EDGES_AT, (node_id,)))
+                rows = list(found.values())
+        return _table(rows)
+
+    def changed_since(self, version: int) -> Sequence[int] | None:
+        """Return the nodes whose edges changed after a version; None when that is too long ago to tell."""
+        with schema.guarded(self.path):
+            oldest = self._db.execute("SELECT coalesce(min(version), 0) FROM change").fetchone()[0]
+            if oldest > version + 1:
+                return None
+            rows = self._db.execute("SELECT DISTINCT node FROM change WHERE version > ?", (version,))
+            return [int(node_id) for (node_id,) in rows]
+
     def node_of(self, name: str) -> int | None:
         """Return the node that bears this name."""
         with schema.guarded(self.path):
@@ -96,3 +126,19 @@ class TopoReader:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _table(rows: Sequence[tuple[Any, ...]]) -> EdgeTable:
+    edge_id, source, target, time, blocked, measure = zip(*rows, strict=True) if rows else ((),) * 6
+    step = len(measure[0]) // 8 if measure else 2
+    values = np.frombuffer(b"".join(measure), dtype="<f8").reshape(-1, step)
+    length_m = np.hypot(values[:, 0], values[:, 1])
+    learnt_s = np.array(time, dtype=np.float64)  # None becomes NaN
+    return EdgeTable(
+        edge_id=np.array(edge_id, dtype=np.int64),
+        source_id=np.array(source, dtype=np.int64),
+        target_id=np.array(target, dtype=np.int64),
+        length_m=length_m.astype(np.float32),
+        time_s=np.where(np.isnan(learnt_s), length_m / USUAL_SPEED_MPS, learnt_s).astype(np.float32),
+        blocked_until_s=np.nan_to_num(np.array(blocked, dtype=np.float64)),
+    )

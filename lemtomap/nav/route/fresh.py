@@ -18,10 +18,12 @@ class FreshGraph:
         newest = sorted(map_view.T_grid_node)[-NEWEST:]
         self._newborn = {node_id for node_id in newest if not graph.has_node(node_id)}
         self._extra: dict[int, list[RouteEdge]] = {}
+        self._rows: list[tuple[int, int, int, float, float, float]] = []
         for edge_id, a, b, _ in map_view.edges if self._newborn else ():
             if a not in self._newborn and b not in self._newborn:
                 continue
             length_m = float(np.hypot(*(map_view.T_grid_node[a] - map_view.T_grid_node[b])[:2]))
+            self._rows.append((edge_id, a, b, length_m, length_m / usual_speed_mps, 0.0))
             for here, other in ((a, b), (b, a)):
                 edge = RouteEdge(edge_id, other, length_m, length_m / usual_speed_mps)
                 self._extra.setdefault(here, []).append(edge)
@@ -30,6 +32,10 @@ class FreshGraph:
     def version(self) -> int:
         """The version of the graph on file."""
         return self._graph.version
+
+    def newborn_edges(self) -> list[tuple[int, int, int, float, float, float]]:
+        """Return the edges that are not on file yet: id, two nodes, length m, time s, blocked until s."""
+        return self._rows
 
     def has_node(self, node_id: int) -> bool:
         """Tell whether the file or the view knows this node."""

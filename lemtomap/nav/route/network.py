@@ -5,8 +5,7 @@ is a tree of best ways towards the goal; when a way proves closed, an A* search 
 next best.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,21 +15,12 @@ from lemtomap.errors import NoRoute
 from lemtomap.nav.config import RouteConfig
 from lemtomap.nav.route import kernels
 from lemtomap.nav.route.planner import Route
-from lemtomap.types import RouteEdge
+from lemtomap.types import EdgeTable, RouteEdge
 
 Column = NDArray[Any]
 
-
-@dataclass(frozen=True, slots=True)
-class EdgeTable:
-    """Edges in columns of equal length."""
-
-    edge_id: NDArray[np.int64]
-    source_id: NDArray[np.int64]
-    target_id: NDArray[np.int64]
-    length_m: NDArray[np.float32]
-    time_s: NDArray[np.float32]
-    blocked_until_s: NDArray[np.float64]
+FALLEN = 0.8
+"""An edge that has become this much cheaper makes the tree of ways worth a new search."""
 
 
 class RouteNetwork:
@@ -47,6 +37,7 @@ class RouteNetwork:
         self._time_s = np.zeros(_room(count), dtype=np.float32)
         self._open_price = np.full(_room(count), np.inf, dtype=np.float32)
         self._blocked_s = np.zeros(_room(count))
+        self._chained = np.zeros(_room(count), dtype=bool)
         self._price = np.empty(0, dtype=np.float32)
         self._goal_id = -1
         self._to_go = np.empty(0, dtype=np.float32)
@@ -55,15 +46,14 @@ class RouteNetwork:
         self.put(edges)
 
     def put(self, edges: EdgeTable) -> None:
-        """Add new edges and take over new times and blockings of known ones."""
+        """Add new edges and take over new times and blockings of known ones. Each edge comes once."""
         ids = edges.edge_id
-        self._make_room(
-            int(max(edges.source_id.max(initial=0), edges.target_id.max(initial=0))), int(ids.max(initial=0))
-        )
-        new = np.isinf(self._open_price[ids])
-        price = self._config.learnt_weight * edges.time_s + (1.0 - self._config.learnt_weight) * (
-            edges.length_m / self._config.usual_speed_mps
-        )
+        if not ids.size:
+            return
+        self._make_room(int(max(edges.source_id.max(), edges.target_id.max())), int(ids.max()))
+        new = ~self._chained[ids]
+        share, usual_mps = self._config.learnt_weight, self._config.usual_speed_mps
+        price = share * edges.time_s + (1.0 - share) * edges.length_m / usual_mps
         self._length_m[ids], self._time_s[ids] = edges.length_m, edges.time_s
         self._open_price[ids], self._blocked_s[ids] = np.maximum(price, 1e-3), edges.blocked_until_s
         kernels.chain_arcs(
@@ -74,7 +64,20 @@ class RouteNetwork:
             self._next_arc,
             self._arc_to,
         )
-        self._goal_id = -1  # something may have become cheaper
+        self._chained[ids] = True
+        if new.any():
+            self._goal_id = -1  # a shorter way may have appeared
+
+    def renew(self, node_ids: Iterable[int], edges: EdgeTable) -> None:
+        """Take over all edges that changed nodes have now; those they no longer have are gone for good."""
+        still = set(edges.edge_id.tolist())
+        for node_id in node_ids:
+            arc = int(self._first_arc[node_id]) if node_id < self._first_arc.size else -1
+            while arc >= 0:
+                if arc >> 1 not in still:
+                    self._open_price[arc >> 1] = np.inf
+                arc = int(self._next_arc[arc])
+        self.put(edges)
 
     def plan(
         self, start_id: int, goal_id: int, now_s: float, closed_until_s: Mapping[int, float] | None = None
@@ -92,7 +95,8 @@ class RouteNetwork:
         if start_id == goal_id:
             return Route((start_id,), (), 0.0)
         price = self._prices(now_s, closed_until_s or {})
-        if goal_id != self._goal_id or bool((price < self._price).any()):
+        fallen = self._goal_id == goal_id and bool((price < FALLEN * self._price).any())
+        if goal_id != self._goal_id or fallen:
             return self._plan_anew(start_id, goal_id, price)
         self._price = price
         return self._plan_around(start_id, goal_id, price)
@@ -169,6 +173,7 @@ class RouteNetwork:
             self._time_s = _grown(self._time_s, size, 0.0)
             self._open_price = _grown(self._open_price, size, np.inf)
             self._blocked_s = _grown(self._blocked_s, size, 0.0)
+            self._chained = _grown(self._chained, size, 0)
 
 
 def _room(count: int) -> int:

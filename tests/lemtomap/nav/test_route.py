@@ -1,0 +1,101 @@
+"""Routes: the flat network against plain Dijkstra, and both against what may happen to a graph."""
+
+import numpy as np
+import pytest
+
+from lemtomap.errors import NoRoute
+from lemtomap.nav.config import RouteConfig
+from lemtomap.nav.route.network import RouteNetwork
+from lemtomap.nav.route.planner import plan_route
+from lemtomap.nav.route.planning import RoutePlanner, table_of
+from lemtomap.topo.graph import Edge
+from lemtomap.topo.reader import TopoReader
+from lemtomap.topo.store import TopoStore
+from lemtomap.types import EdgeType
+from tests.lemtomap.nav.world import Graph, World
+
+CONFIG = RouteConfig()
+
+
+def city(rng, side=12) -> Graph:
+    """A grid of places with some links missing."""
+    places = {1 + r * side + c: (float(c), float(r)) for r in range(side) for c in range(side)}
+    pairs = [(n, n + 1) for n in places if n % side] + [(n, n + side) for n in places if n + side in places]
+    return Graph.of(places, [pair for pair in pairs if rng.random() < 0.8])
+
+
+def rows_of(graph: Graph):
+    return [
+        (edge_id, a, b, graph.length(a, b), graph.length(a, b) / 0.4, graph.blocked_s.get(edge_id, 0.0))
+        for edge_id, a, b in graph.links
+    ]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_flat_network_agrees_with_dijkstra_while_edges_close_and_open(seed):
+    rng = np.random.default_rng(seed)
+    graph = city(rng)
+    network = RouteNetwork(table_of(rows_of(graph)), CONFIG)
+    start, goal = 1, 144
+    for _ in range(25):
+        closed = {
+            int(rng.integers(100, 100 + len(graph.links))): 10.0 for _ in range(int(rng.integers(0, 30)))
+        }
+        start = int(rng.integers(1, 145)) if rng.random() < 0.3 else start
+        try:
+            slow = plan_route(graph, start, goal, 0.0, CONFIG, closed)
+        except NoRoute:
+            with pytest.raises(NoRoute):
+                network.plan(start, goal, 0.0, closed)
+            continue
+        fast = network.plan(start, goal, 0.0, closed)
+        assert fast.cost_s == pytest.approx(slow.cost_s, rel=1e-4)
+        assert fast.nodes[0] == start
+        assert fast.nodes[-1] == goal
+        assert not {edge.edge_id for edge in fast.edges} & closed.keys()
+        for here, edge, there in zip(fast.nodes, fast.edges, fast.nodes[1:], strict=False):
+            assert edge.edge_id in {e.edge_id for e in graph.edges_of(here) if e.other_id == there}
+
+
+def test_prefers_the_way_that_is_known_to_be_quicker():
+    graph = Graph.of(
+        {1: (0.0, 0.0), 2: (1.0, 0.0), 3: (2.0, 0.0), 4: (1.0, 1.2)}, [(1, 2), (2, 3), (1, 4), (4, 3)]
+    )
+    rows = rows_of(graph)
+    rows[1] = (*rows[1][:4], 30.0, 0.0)  # usually somebody stands there
+    assert RouteNetwork(table_of(rows), CONFIG).plan(1, 3, 0.0).nodes == (1, 4, 3)
+
+
+def test_blocked_edge_opens_again_after_its_time():
+    graph = Graph.of({1: (0.0, 0.0), 2: (1.0, 0.0)}, [(1, 2)])
+    graph.blocked_s[100] = 50.0
+    with pytest.raises(NoRoute, match="tried again in 40 s"):
+        plan_route(graph, 1, 2, 10.0, CONFIG)
+    assert plan_route(graph, 1, 2, 51.0, CONFIG).nodes == (1, 2)
+
+
+def test_large_map_on_file_is_planned_in_step_with_its_changes(tmp_path):
+    def edge(a: int, b: int) -> Edge:
+        return Edge(0, a, b, np.array([1.0, 0.0, 0.0]), np.eye(3) * 1e-4, EdgeType.ODOMETRY)
+
+    store = TopoStore.create(tmp_path / "map.lemto", durable=False)
+    for _ in range(40):
+        store.add_node()
+    chain = [store.add_edge(edge(n, n + 1)) for n in range(1, 40)]
+    store.commit()
+    world = World(5.0, 5.0, Graph.of({1: (1.0, 1.0)}, []))
+    planner = RoutePlanner(RouteConfig(large_nodes=10))
+    with TopoReader(tmp_path / "map.lemto") as reader:
+
+        def route() -> tuple[int, ...]:
+            return planner.plan(reader, world.view(1), 40, 0.0, {}).nodes
+
+        assert route() == tuple(range(1, 41))
+        store.add_edge(edge(2, 39))
+        store.commit()
+        assert route() == (1, 2, 39, 40)
+        store.delete_edge(chain[-1].edge_id)
+        store.commit()
+        with pytest.raises(NoRoute):
+            route()
+    store.close()
