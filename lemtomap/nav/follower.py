@@ -16,6 +16,9 @@ LOOK_M = 0.40
 MOVING_MPS = 0.10
 MOVING_TURN_RAD = 1.9
 """A robot under way bends round rather than stops, unless the way leads back."""
+HELD_MPS = 0.03
+HELD_TURN_RAD = 0.15
+"""A robot that no arc lets forward faces its way first."""
 
 
 class Motion(StrEnum):
@@ -59,7 +62,10 @@ class Follower:
         if self._must_turn(heading_off, twist):
             return Step(turn_in_place(heading_off, twist, config), Motion.TURN)
         ending = None if end_m is None else Ending(end_m)
-        choice = choose_twist(plan, T_grid_base, twist, ending, body, config.dwa, config.costmap)
+        choice = choose_twist(plan, T_grid_base, twist, ending, body, config.dwa)
+        held = choice.twist is None or choice.twist.v_mps < HELD_MPS
+        if held and abs(heading_off) > HELD_TURN_RAD and twist.v_mps < HELD_MPS:
+            return Step(turn_in_place(heading_off, twist, config), Motion.TURN)
         if choice.twist is None:
             return Step(approach(twist, Twist(0.0, 0.0), body, config.period_s), Motion.STUCK)
         return Step(approach(twist, choice.twist, body, config.period_s), Motion.DRIVE)

@@ -41,6 +41,7 @@ from lemtomap.types import MapView, RouteGraph, Twist
 NEAR_BARRIER_M = 1.0
 BUMP_BACK_M = 0.15
 AT_NODE_M = 0.5
+STAYED_M = 0.4
 REST = Twist(0.0, 0.0)
 
 
@@ -93,12 +94,21 @@ class Navigator:
         return self._goal
 
     def set_goal(self, goal: Goal | int, now_s: float) -> None:
-        """Take a new goal (an int is a node's id); accepted in every state."""
+        """Take a new goal (an int is a node's id); accepted in every state.
+
+        A robot that has hardly moved since the last goal keeps its count of failed recoveries: whoever moves
+        the goal about while it is stuck does not keep it from giving up.
+        """
+        stayed = self._goal is not None and self._way_back.stayed_m < STAYED_M
         self._goal = Goal(goal) if isinstance(goal, int) else goal
         self._route, self._plan, self._target = None, None, None
         self._waiting_s = self._lost_s = self._shut_since_s = None
         self._planned_s = -np.inf
         self._follower.restart()
+        if stayed:
+            self._progress.move_goal()
+            return
+        self._way_back.start_leg()
         self._barriers.reset()
         self._ladder.reset()
         self._progress.restart(now_s)

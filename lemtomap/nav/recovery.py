@@ -39,6 +39,10 @@ class ProgressWatch:
         self.gained_m = 0.0
         self.grace(now_s)
 
+    def move_goal(self) -> None:
+        """The goal moved while the robot did not: measure anew, but the clock runs on."""
+        self._best_m = np.inf
+
     def grace(self, now_s: float) -> None:
         """Give what is being tried its time; what had been reached before still stands."""
         self._since_s = now_s
@@ -60,9 +64,19 @@ class WayBack:
     def __init__(self, length_m: float = 2.0, step_m: float = 0.04) -> None:
         self._step_m = step_m
         self._crumbs: deque[Pose] = deque(maxlen=int(length_m / step_m))
+        self._leg_T_odom: Pose | None = None
+        self.stayed_m = 0.0
+        """How far from where the leg was started the robot has been."""
+
+    def start_leg(self) -> None:
+        """Measure stayed_m from here."""
+        self._leg_T_odom, self.stayed_m = None, 0.0
 
     def drove(self, T_odom_base: Pose) -> None:
         """Drop a crumb when the robot has moved on."""
+        if self._leg_T_odom is None:
+            self._leg_T_odom = np.array(T_odom_base)
+        self.stayed_m = max(self.stayed_m, float(np.hypot(*(T_odom_base - self._leg_T_odom)[:2])))
         if not self._crumbs or np.hypot(*(T_odom_base - self._crumbs[-1])[:2]) >= self._step_m:
             self._crumbs.append(np.array(T_odom_base))
 

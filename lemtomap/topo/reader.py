@@ -96,7 +96,7 @@ class TopoReader:
             if node_ids is None:
                 rows = self._db.execute(_ALL_EDGES).fetchall()
             else:
-                found = {}  # an edge is met from both its ends
+                found: dict[int, tuple[Any, ...]] = {}  # an edge is met from both its ends
                 for node_id in set(node_ids):
                     found.update((row[0], row) for row in self._db.execute(_EDGES_AT, (node_id,)))
                 rows = list(found.values())

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.nav.config import BodyLimits, CostmapConfig, DwaConfig
+from lemtomap.nav.config import BodyLimits, DwaConfig
 from lemtomap.nav.metric import MetricPlan
 from lemtomap.nav.motion import kernels
 from lemtomap.se2 import Pose
@@ -46,7 +46,6 @@ def choose_twist(
     ending: Ending | None,
     body: BodyLimits,
     dwa: DwaConfig,
-    costmap: CostmapConfig,
 ) -> Choice:
     """Return the best velocity reachable within the dynamic window."""
     costs = plan.costs
@@ -57,7 +56,7 @@ def choose_twist(
     forward_m = 0.0 if ending is not None and ending.to_go_m < NEAR_M else dwa.forward_m
     vs, ws = velocity_window(twist, v_cap_mps, body, dwa)
     here_m = float(costs.clearance[int(row), int(col)]) * costs.resolution_m
-    body_m = min(body.radius_m + costmap.margin_m, max(TIGHTEST_M, here_m - 0.1 * costs.resolution_m))
+    body_m = min(body.radius_m, max(TIGHTEST_M, here_m - 0.1 * costs.resolution_m))
     scores = np.empty((vs.size, ws.size))
     best = kernels.score_trajectories(
         plan.field, costs.clearance, costs.resolution_m, row, col, float(T_grid_base[2]),
