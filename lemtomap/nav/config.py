@@ -49,6 +49,7 @@ class DwaConfig:
     window_s: float = 0.3  # velocities reachable in this time are tried
     horizon_s: float = 1.6
     step_s: float = 0.1
+    margin_m: float = 0.025  # as the costmap's
     forward_m: float = 0.30  # the way ahead is read this far before the axle; thesis: 0.325
     clearance_weight: float = 0.25  # metres of way for driving right beside something
     clearance_falloff_m: float = 0.06

@@ -7,7 +7,7 @@ import numpy as np
 
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.metric import MetricPlan
-from lemtomap.nav.motion.dwa import Ending, approach, choose_twist
+from lemtomap.nav.motion.dwa import HELD_MPS, Ending, approach, choose_twist
 from lemtomap.se2 import Pose, wrap_angle
 from lemtomap.types import Twist
 
@@ -16,7 +16,6 @@ LOOK_M = 0.40
 MOVING_MPS = 0.10
 MOVING_TURN_RAD = 1.9
 """A robot under way bends round rather than stops, unless the way leads back."""
-HELD_MPS = 0.03
 HELD_TURN_RAD = 0.15
 """A robot that no arc lets forward faces its way first."""
 

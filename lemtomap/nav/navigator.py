@@ -286,7 +286,7 @@ class Navigator:
         remaining_m = plan.length_m + sum(edge.length_m for edge in route.edges[target.index :])
         if self._progress.stuck(remaining_m, moment.now_s):
             return self._climb(moment)
-        self._ladder.relax(self._progress.gained_m)
+        self._ladder.relax(self._progress.take_gain())
         return self._send(route, plan, target, step, moment)
 
     def _send(self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: _Moment) -> NavOutput:

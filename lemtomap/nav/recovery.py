@@ -30,14 +30,17 @@ class ProgressWatch:
         self._config = config
         self._best_m = np.inf
         self._since_s = -np.inf
-        self.gained_m = 0.0
-        """Way made good since the restart."""
+        self._gained_m = 0.0
 
     def restart(self, now_s: float) -> None:
         """Begin anew: a new goal or a new route."""
         self._best_m = np.inf
-        self.gained_m = 0.0
         self.grace(now_s)
+
+    def take_gain(self) -> float:
+        """Return the metres made good since the last call."""
+        gained_m, self._gained_m = self._gained_m, 0.0
+        return gained_m
 
     def move_goal(self) -> None:
         """The goal moved while the robot did not: measure anew, but the clock runs on."""
@@ -52,7 +55,7 @@ class ProgressWatch:
         if np.isinf(self._best_m):
             self._best_m = remaining_m
         elif remaining_m < self._best_m - self._config.progress_m:
-            self.gained_m += self._best_m - remaining_m
+            self._gained_m += self._best_m - remaining_m
             self._best_m = remaining_m
             self._since_s = now_s
         return now_s - self._since_s > self._config.progress_s
@@ -108,6 +111,7 @@ class Ladder:
         self._config = config
         self._next = Rung.REPLAN
         self._rounds = 0
+        self._gained_m = 0.0
         self._running: _Running | None = None
 
     @property
@@ -131,14 +135,16 @@ class Ladder:
 
     def relax(self, gained_m: float) -> None:
         """Start from the foot after progress; only much of it lets past failures be forgotten."""
-        if self._running is None and gained_m > 0.0:
-            self._next = Rung.REPLAN
-            if gained_m >= self._config.forgive_m:
-                self._rounds = 0
+        if self._running is not None or gained_m == 0.0:
+            return
+        self._next = Rung.REPLAN
+        self._gained_m += gained_m
+        if self._gained_m >= self._config.forgive_m:
+            self._rounds = 0
 
     def climb(self, T_odom_base: Pose, now_s: float) -> Rung:
         """Take the next rung; turning and backing off then run through `step`."""
-        rung = self._next
+        rung, self._gained_m = self._next, 0.0
         self._next = Rung((rung + 1) % len(Rung))
         if rung == Rung.BLOCK:
             self._rounds += 1

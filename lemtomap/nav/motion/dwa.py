@@ -16,6 +16,7 @@ TIGHTEST_M = 0.10
 
 
 CREEP_MPS = 0.06
+HELD_MPS = 0.03
 NEAR_M = 1.3
 """This near to where it stops, the robot looks at the spot itself and no longer at the way ahead."""
 
@@ -47,24 +48,43 @@ def choose_twist(
     body: BodyLimits,
     dwa: DwaConfig,
 ) -> Choice:
-    """Return the best velocity reachable within the dynamic window."""
+    """Return the best velocity reachable within the dynamic window.
+
+    Tried with the margin the planner keeps; where that lets no arc forward, with the bare body.
+    """
+    if not plan.costs.holds(T_grid_base):
+        return Choice(None, 0)
+    choice = _choose(plan, T_grid_base, twist, ending, body, dwa, body.radius_m + dwa.margin_m)
+    if choice.twist is None or choice.twist.v_mps < HELD_MPS:
+        bare = _choose(plan, T_grid_base, twist, ending, body, dwa, body.radius_m)
+        return choice if bare.twist is None else bare
+    return choice
+
+
+def _choose(
+    plan: MetricPlan,
+    T_grid_base: Pose,
+    twist: Twist,
+    ending: Ending | None,
+    body: BodyLimits,
+    dwa: DwaConfig,
+    keep_m: float,
+) -> Choice:
     costs = plan.costs
     row, col = costs.cell(T_grid_base)
-    if not costs.holds(T_grid_base):
-        return Choice(None, 0)
+    near = ending is not None and ending.to_go_m < NEAR_M
     v_cap_mps = body.v_max_mps if ending is None else ending.v_cap_mps(body.braking_mps2)
-    forward_m = 0.0 if ending is not None and ending.to_go_m < NEAR_M else dwa.forward_m
     vs, ws = velocity_window(twist, v_cap_mps, body, dwa)
     here_m = float(costs.clearance[int(row), int(col)]) * costs.resolution_m
-    body_m = min(body.radius_m, max(TIGHTEST_M, here_m - 0.1 * costs.resolution_m))
+    body_m = min(keep_m, max(TIGHTEST_M, here_m - 0.1 * costs.resolution_m))
     scores = np.empty((vs.size, ws.size))
     best = kernels.score_trajectories(
         plan.field, costs.clearance, costs.resolution_m, row, col, float(T_grid_base[2]),
         twist.v_mps, twist.w_radps, vs, ws,
         body.acceleration_mps2, body.braking_mps2, body.turn_acceleration_radps2,
-        dwa.horizon_s, dwa.step_s, forward_m, body_m,
+        dwa.horizon_s, dwa.step_s, 0.0 if near else dwa.forward_m, body_m,
         dwa.clearance_weight, dwa.clearance_falloff_m, dwa.turn_weight, dwa.change_weight,
-        int(ending is not None and ending.to_go_m < NEAR_M), scores,
+        int(near), scores,
     )  # fmt: skip
     if best < 0:
         return Choice(None, scores.size)
