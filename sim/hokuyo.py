@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import scip
+from sim.hokuyo_stream import Stream, check_range, cut, remaining
 
-FIRST_STEP, FRONT_STEP, LAST_STEP, STEPS, SLITS = 44, 384, 725, 769, 1024
+FIRST_STEP, FRONT_STEP, LAST_STEP, SLITS = 44, 384, 725, 1024
 """Steps with data are FIRST..LAST, 682 of them; 0..768 may be asked for, 1024 make a full turn."""
 NOT_MEASURABLE = 19
 STRING_MAX = 16
@@ -38,24 +39,6 @@ class HokuyoConfig:
     """The laser cannot be turned on."""
 
 
-@dataclass(slots=True)
-class _Stream:
-    """A running MD or MS."""
-
-    echo: str
-    characters: int
-    first: int
-    last: int
-    cluster: int
-    interval: int
-    left: int
-    endless: bool
-    tail: str
-    asked_s: float
-    skip: int = 0
-    sent: int = 0
-
-
 @dataclass
 class HokuyoFirmware:
     """The state machine of section 13."""
@@ -71,7 +54,7 @@ class HokuyoFirmware:
     _buffer: bytearray = field(default_factory=bytearray)
     _epoch_s: float = 0.0
     _epoch_ms: int = -1
-    _stream: _Stream | None = None
+    _stream: Stream | None = None
     _asked: list[tuple[str, int, int, int, int]] = field(default_factory=list)
     _latest: tuple[int, NDArray[np.int64]] | None = None
 
@@ -117,7 +100,7 @@ class HokuyoFirmware:
             replies.append(self._continue(self._stream, stamp, ranges_mm))
         return b"".join(replies)
 
-    def _continue(self, stream: _Stream, stamp: int, ranges_mm: NDArray[np.int64]) -> bytes:
+    def _continue(self, stream: Stream, stamp: int, ranges_mm: NDArray[np.int64]) -> bytes:
         if stream.skip:
             stream.skip -= 1
             return b""
@@ -127,16 +110,16 @@ class HokuyoFirmware:
         if trouble == BROKEN_STATUS:
             self._stop()
         if trouble:
-            return scip.reply(_remaining(stream), trouble)
+            return scip.reply(remaining(stream), trouble)
         if not stream.endless:
             stream.left -= 1
-        values = _cut(ranges_mm, stream.first, stream.last, stream.cluster)
-        frame = scip.reply(_remaining(stream), "99", scip.measurement(stamp, values, stream.characters))
+        values = cut(ranges_mm, stream.first, stream.last, stream.cluster)
+        frame = scip.reply(remaining(stream), "99", scip.measurement(stamp, values, stream.characters))
         if not stream.endless and stream.left == 0:
             self._stop()
         return frame
 
-    def _trouble(self, stream: _Stream) -> str:
+    def _trouble(self, stream: Stream) -> str:
         """Return the status a simulated failure gives now, empty for none."""
         over = stream.sent - DB_SCANS
         if self.config.laser_fault or self.failure in {"01", "02"}:
@@ -155,7 +138,7 @@ class HokuyoFirmware:
             return scip.reply(line, "10")
         stamp, ranges_mm = self._latest
         return scip.reply(
-            line, "00", scip.measurement(stamp, _cut(ranges_mm, first, last, cluster), characters)
+            line, "00", scip.measurement(stamp, cut(ranges_mm, first, last, cluster), characters)
         )
 
     def _stop(self) -> None:
@@ -289,7 +272,7 @@ class HokuyoFirmware:
         return scip.reply(line, status)
 
     def _get(self, line: str, rest: str, _now_s: float) -> bytes:
-        status = _check_range(rest, 10)
+        status = check_range(rest, 10)
         if status is None and not self.laser_on:
             status = "10"
         if status is not None:
@@ -301,7 +284,7 @@ class HokuyoFirmware:
         return b""
 
     def _measure(self, line: str, rest: str, now_s: float) -> bytes:
-        status = _check_range(rest, 13)
+        status = check_range(rest, 13)
         if status is None and not rest[10].isdigit():
             status = "06"
         if status is None and not rest[11:13].isdigit():
@@ -312,7 +295,7 @@ class HokuyoFirmware:
             return scip.reply(line, status)
         count = int(rest[11:13])
         self.laser_on = True
-        self._stream = _Stream(
+        self._stream = Stream(
             echo=line[:13],
             characters=3 if line[1] == "D" else 2,
             first=int(rest[:4]),
@@ -325,36 +308,6 @@ class HokuyoFirmware:
             asked_s=now_s,
         )
         return scip.reply(line, "00")
-
-
-def _remaining(stream: _Stream) -> str:
-    return f"{stream.echo}{stream.left:02d}{stream.tail}"
-
-
-def _check_range(rest: str, length: int) -> str | None:
-    """Return the status that refuses start, end and cluster, or None when they are good."""
-    if len(rest) != length:
-        return "0C"
-    for digits, status in ((rest[:4], "01"), (rest[4:8], "02"), (rest[8:10], "03")):
-        if not digits.isdigit():
-            return status
-    if int(rest[4:8]) >= STEPS:
-        return "04"
-    return "05" if int(rest[4:8]) < int(rest[:4]) else None
-
-
-def _cut(ranges_mm: NDArray[np.int64], first: int, last: int, cluster: int) -> NDArray[np.int64]:
-    """Return the asked steps; of each group the smallest valid distance, else its first error code."""
-    values = ranges_mm[first : last + 1]
-    if cluster <= 1:
-        return values
-    groups = range(0, len(values), cluster)
-    return np.array([_smallest_valid(values[start : start + cluster]) for start in groups])
-
-
-def _smallest_valid(group: NDArray[np.int64]) -> int:
-    valid = group[group >= 20]
-    return int(valid.min()) if len(valid) else int(group[0])
 
 
 _HANDLERS: dict[str, Callable[[HokuyoFirmware, str, str, float], bytes]] = {

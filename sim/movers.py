@@ -63,6 +63,7 @@ class SwingDoor:
 
 
 class _SwingingDoor:
+    ROBOT_M = 0.22  # its radius, half the leaf and two fingers
     TURN_RADPS = math.radians(45)  # two seconds for a door, as people open them
 
     def __init__(self, door: SwingDoor, phase_s: float) -> None:
@@ -77,9 +78,21 @@ class _SwingingDoor:
     def step(self, now_s: float, dt_s: float, robot: Pose2) -> Pose2:
         door = self._door
         change = self._wanted(now_s) - self._angle
-        if change and math.dist(door.hinge, robot[:2]) > door.width_m + 0.25:
-            self._angle += math.copysign(min(abs(change), self.TURN_RADPS * dt_s), change)
+        turn = math.copysign(min(abs(change), self.TURN_RADPS * dt_s), change)
+        if change and not self._would_hit(robot, turn):
+            self._angle += turn
         return (*door.hinge, door.closed_yaw_rad + self._angle)
+
+    def _would_hit(self, robot: Pose2, turn: float) -> bool:
+        """Tell whether the leaf, moving by turn, comes upon the robot."""
+        dx, dy = robot[0] - self._door.hinge[0], robot[1] - self._door.hinge[1]
+        distance = math.hypot(dx, dy)
+        if distance > self._door.width_m + self.ROBOT_M or distance < 1e-6:
+            return False
+        bearing = math.atan2(dy, dx) - self._door.closed_yaw_rad - self._angle
+        ahead = (bearing + math.pi) % (2 * math.pi) - math.pi
+        half = math.asin(min(1.0, self.ROBOT_M / distance))
+        return 0.0 < ahead * math.copysign(1.0, turn) < half + abs(turn)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sim import worlds
 from sim.errors import BadWorld
-from sim.world import Surface, World
+from sim.world import Box, Surface, World
 
 COLOURS = {
     Surface.WALL: "#333333",
@@ -21,6 +21,7 @@ COLOURS = {
     Surface.DARK: "#6b2d2d",
     Surface.GLASS: "#7fd0ee",
     Surface.PERSON: "#c0392b",
+    Surface.FLOOR: "#dfe8d8",
 }
 INCHES_LONG = 8.0
 
@@ -51,7 +52,7 @@ def draw(world: World, axis: Any, track: NDArray[np.float64] | None = None) -> N
     extent = (x0, x0 + cols * raster.resolution_m, y0, y0 + rows * raster.resolution_m)
     axis.imshow(np.where(raster.free, 1.0, 0.85), origin="lower", extent=extent, cmap="gray", vmin=0, vmax=1)
     for surface, colour in COLOURS.items():
-        outlines = [_outline(box) for box in world.boxes if box.surface is surface and box.centre[2] < 1.5]
+        outlines = [_outline(box) for box in world.boxes if box.surface is surface and _is_drawn(box)]
         if outlines:
             axis.add_collection(_polygons(outlines, colour))
     for room in world.truth.rooms if len(world.truth.rooms) <= 30 else ():
@@ -73,7 +74,12 @@ def draw(world: World, axis: Any, track: NDArray[np.float64] | None = None) -> N
     axis.tick_params(labelsize=6)
 
 
-def _outline(box: Any) -> NDArray[np.float64]:
+def _is_drawn(box: Box) -> bool:
+    """Tell whether a box belongs into a plan: no ceilings; of the floor only ramps."""
+    return box.centre[2] < 1.5 and (box.surface is not Surface.FLOOR or box.pitch_rad != 0.0)
+
+
+def _outline(box: Box) -> NDArray[np.float64]:
     cos, sin = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
     corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * box.half[:2]
     return np.asarray(corners @ np.array([[cos, sin], [-sin, cos]]) + box.centre[:2])

@@ -1,5 +1,7 @@
 """ROS map_server maps (YAML beside a PGM or PNG) as worlds: walls merged into few long boxes, extruded."""
 
+import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from PIL import Image, UnidentifiedImageError
 
 from sim.errors import BadWorld
 from sim.raster import SPAWN_CLEARANCE_M, boxes_from_raster, clearance_m, connected, find_spawn
+from sim.ros_truth import read_truth
 from sim.world import Pose2, Raster, World
 
 WALL_HEIGHT_M = 1.0
@@ -27,13 +30,15 @@ def load_ros_map(path: Path) -> World:
     probability = _read_image(image_path, negate=bool(settings.get("negate", 0)))
     try:
         resolution = float(settings["resolution"])
-        x0, y0 = (float(value) for value in settings["origin"][:2])
+        x0, y0, turn = (float(value) for value in (*settings["origin"], 0.0)[:3])
         occupied_from = float(settings.get("occupied_thresh", 0.65))
         free_below = float(settings.get("free_thresh", 0.196))
     except (TypeError, ValueError, IndexError) as error:
         raise BadWorld(f"{path}: resolution, origin or thresholds are not numbers ({error})") from error
     if not 0.001 <= resolution <= 1.0:
         raise BadWorld(f"{path}: resolution {resolution} m is outside 0.001 to 1 m")
+    if not all(map(math.isfinite, (x0, y0))) or turn != 0.0:
+        raise BadWorld(f"{path}: origin must be finite and not turned, is {settings['origin']}")
     occupied = probability >= occupied_from
     free = probability <= free_below
     if not free.any():
@@ -46,6 +51,7 @@ def load_ros_map(path: Path) -> World:
         boxes=boxes_from_raster(raster, WALL_HEIGHT_M),
         raster=raster,
         spawn=spawn,
+        truth=read_truth(path.parent, raster),
         description=f"ROS map {path.name}",
     )
 
@@ -68,7 +74,7 @@ def _read_yaml(path: Path) -> dict[str, Any]:
 def _read_image(path: Path, *, negate: bool) -> NDArray[np.float64]:
     """Return occupancy probability, float64 (rows, cols), row 0 at least y."""
     try:
-        with Image.open(path) as image:
+        with warnings.catch_warnings(), _opened(path) as image:
             if max(image.size) > MAX_SIDE_PX or min(image.size) < 3:
                 raise BadWorld(f"{path}: {image.size[0]} x {image.size[1]} pixels is no floor plan")
             if image.mode not in {"L", "1", "LA", "I;16", "I"}:
@@ -82,6 +88,11 @@ def _read_image(path: Path, *, negate: bool) -> NDArray[np.float64]:
         raise BadWorld(f"{path}: not a readable image ({error})") from error
     value = grey[::-1] / 255.0
     return value if negate else 1.0 - value
+
+
+def _opened(path: Path) -> Image.Image:
+    warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large halls are large images
+    return Image.open(path)
 
 
 def _spawn(raster: Raster, path: Path) -> Pose2:

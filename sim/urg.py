@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.body import BodyState
-from sim.hokuyo import FIRST_STEP, FRONT_STEP, LAST_STEP, NOT_MEASURABLE, SLITS, STEPS
+from sim.hokuyo import FIRST_STEP, FRONT_STEP, LAST_STEP, NOT_MEASURABLE, SLITS
+from sim.hokuyo_stream import STEPS
 from sim.optics import NOTHING, WEAK, Light, OpticsConfig, measure
 from sim.scene import Scene
 from sim.world import Pose2

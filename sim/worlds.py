@@ -2,6 +2,7 @@
 
     office                 the small built-in one (default)
     office@4               four of them side by side: perceptual aliasing on purpose
+    home                   swinging doors, people, chairs, glass, a ramp, a stairwell (sim/home.toml)
     offices:60:7           a floor of 60 rooms, seed 7
     plan.yaml, plan.yaml@4 a ROS map, or copies of it side by side
     home.toml              a description (sim.toml_world)
@@ -22,6 +23,7 @@ from sim.toml_world import load_toml
 from sim.world import World
 
 MAX_COPIES = 64
+HOME = Path(__file__).with_name("home.toml")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +48,13 @@ RECIPES: dict[str, Recipe] = {
 
 def names() -> list[str]:
     """Return the built-in worlds, the default first."""
-    return ["office", *RECIPES]
+    return ["office", HOME.stem, *RECIPES]
 
 
 def describe() -> dict[str, str]:
     """Return a line about each built-in world."""
     lines = {"office": "a corridor and eight rooms, 16 x 10 m; office@4: four alike side by side"}
+    lines[HOME.stem] = "a flat with all that makes life hard: sim/home.toml shows how worlds are described"
     for name, recipe in RECIPES.items():
         lines[name] = f"{recipe.about}; {name}:{recipe.size}:0 sets {recipe.counts} and seed"
     return lines
@@ -72,6 +75,8 @@ def load(name_or_path: str | Path, *, day: int = 0) -> World:
         return side_by_side(world, copies) if copies > 1 else world
     if copies > 1:
         raise BadWorld(f"{name_or_path}: only 'office' and ROS maps can stand side by side")
+    if text == HOME.stem:
+        return load_toml(HOME, day=day)
     if suffix == ".toml":
         return load_toml(Path(text), day=day)
     return _generated(text)

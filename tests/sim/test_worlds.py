@@ -37,7 +37,7 @@ moved = [[1, 6.0, 0.6, 0.0]]
 
 
 @pytest.mark.parametrize(
-    "name", ["office", "office@2", "offices:24:3", "loop:2:1", "campus:3:2", "storeys:2"]
+    "name", ["office", "office@2", "offices:24:3", "loop:2:1", "campus:3:2", "storeys:2", "home"]
 )
 def test_doors_of_the_ground_truth_can_be_driven_through_and_join_their_rooms(name):
     world = worlds.load(name)
@@ -135,3 +135,24 @@ def test_bad_world_files_are_one_line_with_file_and_place(tmp_path, before, afte
 def test_bad_names_are_refused(name):
     with pytest.raises(BadWorld):
         worlds.load(name)
+
+
+def test_rooms_and_doors_beside_a_map_become_its_ground_truth(tmp_path):
+    grey = np.full((40, 60), 254, dtype=np.uint8)
+    grey[0] = grey[-1] = grey[:, 0] = grey[:, -1] = grey[:15, 30] = grey[25:, 30] = 0
+    (tmp_path / "m.pgm").write_bytes(b"P5\n60 40\n255\n" + grey.tobytes())
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.1\norigin: [-1, -2, 0]\nnegate: 0\n")
+    (tmp_path / "locations.yaml").write_text(
+        "locations: [a, b]\npolygons:\n- [0, 0, 30, 0, 30, 40, 0, 40]\n- [30, 0, 60, 0, 60, 40, 30, 40]\n"
+    )
+    (tmp_path / "doors.yaml").write_text(
+        "- name: d\n  approach: [{from: a}, {from: b}]\n"
+        "  door_corner_pt_1: [2.0, -0.5]\n  door_corner_pt_2: [2.0, 0.5]\n"
+    )
+    truth = worlds.load(tmp_path / "m.yaml").truth
+    assert truth.graph() == {"a": {"b"}, "b": {"a"}}
+    assert truth.room_at(1.9, 1.9) == "a"
+    assert truth.room_at(2.1, 1.9) == "b"
+    (tmp_path / "locations.yaml").write_text("locations: [a, b]\npolygons: []\n")
+    with pytest.raises(BadWorld, match=r"locations\.yaml: locations and polygons do not fit"):
+        worlds.load(tmp_path / "m.yaml")
