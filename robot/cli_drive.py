@@ -85,6 +85,9 @@ def sim(
     fast: Annotated[
         bool, typer.Option("--fast", help="lock-step on a virtual clock, as fast as the machine can")
     ] = False,
+    gui: Annotated[
+        bool, typer.Option("--gui", help="also open pybullet's own window (needs a display)")
+    ] = False,
     serve: Annotated[bool, typer.Option("--serve", help="only the fake hardware, until interrupted")] = False,
     seed: Annotated[int, typer.Option(metavar="N", help="of noise in the world and of the particles")] = 0,
     out: Annotated[
@@ -98,13 +101,13 @@ def sim(
     if serve:
         from sim.serve import serve_world
 
-        serve_world(world, seed, duration_s=math.inf, truth_path=None, gui=False)
+        serve_world(world, seed, duration_s=math.inf, truth_path=None, gui=gui)
         return
     from robot.progress import progress_bar
     from robot.sim_run import SimOptions, run_sim
     from robot.told import told_after_run
 
-    options = SimOptions(world, mission, duration, out, seed, fast=fast)
+    options = SimOptions(world, mission, duration, out, seed, fast=fast, gui=gui)
     with progress_bar(f"sim {world}") as bar:
         summary = run_sim(options, bar)
     typer.echo(told_after_run(out, summary))

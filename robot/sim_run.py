@@ -32,6 +32,7 @@ class SimOptions:
     seed: int = 0
     slam: str = "rolling"
     fast: bool = False
+    gui: bool = False
     live: bool = True
 
 
@@ -58,7 +59,7 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
 
 def _drive_fast(options: SimOptions, run: Run) -> None:
     """Run in lock-step on a virtual clock."""
-    simulator = Simulator(worlds.load(options.world), options.seed)
+    simulator = Simulator(worlds.load(options.world), options.seed, gui=options.gui)
     look_at_s = 0.0
 
     def watch(now_s: float) -> None:
@@ -86,7 +87,7 @@ def _truth(simulator: Simulator) -> dict[str, Any]:
 def _drive_in_real_time(options: SimOptions, run: Run) -> None:
     """Run on the wall clock, the simulator in a process of its own behind pseudo-terminals."""
     warm_up(run.plan.config, options.slam)
-    with FakeHardware(options.world, options.seed) as hardware:
+    with FakeHardware(options.world, options.seed, gui=options.gui) as hardware:
         ports = Ports(lambda: open_serial(hardware.kobuki), lambda: open_serial(hardware.hokuyo))
         runtime = Runtime(run.core, ports, run.files)
         ended = runtime.run(parse_mission(options.mission), options.duration_s)

@@ -20,6 +20,8 @@ class FakeHardware:
 
     world: str
     seed: int = 0
+    gui: bool = False
+    """Open pybullet's own window."""
     kobuki: str = ""
     hokuyo: str = ""
     truth: dict[str, Any] = field(default_factory=dict)
@@ -29,7 +31,7 @@ class FakeHardware:
     def __enter__(self) -> Self:
         """Start the server; raises BadInput with the server's own line when it cannot."""
         command = [sys.executable, "-m", "sim.serve", "--world", self.world, "--seed", str(self.seed)]
-        command += ["--parent", str(os.getpid())]
+        command += ["--parent", str(os.getpid())] + ["--gui"] * self.gui
         with tempfile.TemporaryFile("w+") as errors:
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
                 command, stdout=subprocess.PIPE, stderr=errors, text=True, start_new_session=True
