@@ -157,7 +157,8 @@ class Driver(Generic[E]):
         for event in self._session.receive(data, now_s):
             if isinstance(event, WrongDeviceSeen):
                 self._on_event(event)
-                raise WrongDevice(event.reason)
+                where = getattr(self._port, "path", "")  # a real port has one, others need not
+                raise WrongDevice(f"{where}: {event.reason}" if where else event.reason)
             self._on_event(event)
         self._insist = self._insist and not self._session.alive
         self.write(self._session.tick(now_s))

@@ -33,6 +33,9 @@ _LONGEST: Final = 8192  # a scan of 1081 beams has 3.4 kB
 _END: Final = b"\n\n"
 _SCAN_ECHO: Final = re.compile(r"([GM][DS])(\d{4})(\d{4})(\d{2})(?:(\d)(\d{2}))?")
 _FIELD: Final = re.compile(rb"([A-Z]{4}):(.*);([0-o])", re.DOTALL)
+_SCIP1_STATUS: Final = re.compile(
+    rb"0|E[0-9A-Z]?"
+)  # a sensor that switches to SCIP 2.0, or does not know a command
 _STRIDE: Final = BLOCK + 2  # a full data line with its sum and line feed
 
 
@@ -92,8 +95,8 @@ def _strict(data: bytes) -> Reply:
         raise _RefusedError("no echo of a command")
     command, tag = echo["command"].decode(), (echo["tag"] or b"").decode()
     body = body.removesuffix(b"\n")
-    if not body and (status_line == b"0" or status_line.startswith(b"E")):  # a SCIP 1.1 sensor
-        return Status(command, status_line.decode("ascii", "replace"), tag)
+    if not body and _SCIP1_STATUS.fullmatch(status_line):
+        return Status(command, status_line.decode(), tag)
     if len(status_line) != 3 or status_line[2] != line_sum(status_line[:2]):
         raise _RefusedError("no status with a right sum")
     status = status_line[:2].decode("ascii", "replace")
