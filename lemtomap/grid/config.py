@@ -20,7 +20,7 @@ class SlamConfig:
     # when a scan is matched, and when it goes into the window
     match_distance_m: float = 0.02
     match_turn_rad: float = 0.0175
-    integrate_distance_m: float = 0.3
+    integrate_distance_m: float = 0.2
     integrate_turn_rad: float = 0.35
     integrate_period_s: float = 1.0  # a standing robot still learns that a door opened
 
@@ -28,14 +28,14 @@ class SlamConfig:
     # one hit makes a cell occupied even where it was free, one miss takes that back
     evidence_hit: int = 6
     evidence_miss: int = 2
-    evidence_floor: int = -5
+    evidence_floor: int = -12
     evidence_ceiling: int = 12
-    hits_averaged: int = 15
+    hits_averaged: int = 8
 
     # match: point to line against averaged hits
-    match_sigma_m: float = 0.08  # reach of the robust weight
-    match_noise_m: float = 0.03  # of one beam, widened because beams err together
-    point_share: float = 0.05  # of a plane's information that also holds along it
+    match_sigma_m: float = 0.06  # reach of the robust weight
+    match_noise_m: float = 0.04  # of one beam, widened because beams err together
+    point_weight: float = 0.8  # of a hit that lies on no plane, against one that does
     degenerate_below: float = 0.18  # diversity (Appendix D) under which the weak axis follows odometry
     min_points: int = 20
     min_quality: float = 0.25  # a worse match is refused
@@ -49,11 +49,16 @@ class SlamConfig:
     odometry_m_per_m: float = 0.05
     odometry_rad_per_rad: float = 0.2
     odometry_m_per_rad: float = 0.02
-    odometry_rad_per_m: float = 0.03
+    odometry_rad_per_m: float = 0.1
+
+    # drift of the window's frame: after so much travel or turning it is off by the error of one more match
+    renew_m: float = 2.0
+    renew_rad: float = 3.0
 
     # particles
     sample_share: float = 0.5  # of the proposal's standard deviation that is sampled
-    weight_per_quality: float = 40.0  # log weight for the whole step from quality 0 to 1
+    weight_per_quality: float = 200.0  # log weight for the whole step from quality 0 to 1
+    dethrone_ratio: float = 20.0  # another particle becomes the best only when it weighs this many times more
     resample_below: float = 0.5  # effective particles as a share of all
 
     # what is published

@@ -14,7 +14,7 @@ from lemtomap.grid import particles
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.mapper import Tracker
 from lemtomap.grid.matching import Match
-from lemtomap.grid.motion import between, compose, inverted, odometry_motion, rotated
+from lemtomap.grid.motion import between, compose, odometry_uncertainty
 from lemtomap.grid.scan import Beams
 from lemtomap.grid.window import Window
 from lemtomap.se2 import Pose
@@ -72,27 +72,21 @@ class RollingGmapping(Tracker):
         window.integrate(beams, T_grid_base)
 
     def _move_and_weigh(self, beams: Beams, tracked: Match) -> None:
-        """Draw each pose from its proposal and weigh it by how well the scan fits its window (lines 7 to
-        16).
-        """
+        """Draw each pose from its proposal and weigh it by how well the scan fits its window (lines 7-16)."""
         step = between(self._particles[self._best].T_grid_base, tracked.T_grid_base)
-        motion = odometry_motion(step, self.config)
+        uncertainty = odometry_uncertainty(step, self.config)
         for index, particle in enumerate(self._particles):
-            predicted = compose(particle.T_grid_base, motion.step)
-            prior = inverted(rotated(motion.covariance, float(predicted[2])))
-            match = tracked if index == self._best else self._match(beams, predicted, prior, particle.window)
-            particle.log_weight += (
-                self.config.weight_per_quality * match.diversity * (match.quality - tracked.quality)
-            )
-            if match.accepted:
-                particle.T_grid_base = self._draw(match, prior)
-            else:
-                particle.T_grid_base = predicted
+            if index == self._best:
+                particle.T_grid_base = tracked.T_grid_base  # the best stays at the mode of its proposal
+                continue
+            match = self._match(beams, compose(particle.T_grid_base, step), uncertainty, particle.window)
+            gain = match.diversity * (match.quality - tracked.quality)
+            particle.log_weight += self.config.weight_per_quality * gain
+            particle.T_grid_base = self._draw(match)
 
-    def _draw(self, match: Match, prior: NDArray[np.float64]) -> Pose:
-        """Return a pose from the Gaussian around the match fused with the motion prior."""
-        covariance = inverted(match.information + prior)
-        noise = np.linalg.cholesky(covariance) @ self._rng.standard_normal(3)
+    def _draw(self, match: Match) -> Pose:
+        """Return a pose from the Gaussian around the match, fused with the motion prior."""
+        noise = np.linalg.cholesky(match.covariance) @ self._rng.standard_normal(3)
         return np.asarray(match.T_grid_base + self.config.sample_share * noise)
 
     def _own_window(self, particle: Particle) -> None:
@@ -106,10 +100,13 @@ class RollingGmapping(Tracker):
 
     def _choose_and_resample(self) -> None:
         weights = particles.normalised(np.array([particle.log_weight for particle in self._particles]))
-        self._best = int(np.argmax(weights))
+        if weights.max() > self.config.dethrone_ratio * weights[self._best]:
+            self._best = int(np.argmax(weights))
         if particles.effective_number(weights) >= self.config.resample_below * len(weights):
             return
         parents = particles.resample(weights, self._rng)
-        best = self._particles[self._best]
+        survivors = np.flatnonzero(parents == self._best)
+        if not len(survivors):
+            survivors = np.flatnonzero(parents == np.argmax(weights))
         self._particles = [replace(self._particles[parent], log_weight=0.0) for parent in parents]
-        self._best = next((i for i, p in enumerate(self._particles) if p.window is best.window), 0)
+        self._best = int(survivors[0])

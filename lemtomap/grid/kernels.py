@@ -23,7 +23,7 @@ Array = NDArray[Any]
 NONE = 255
 MIN_PLANE_POINTS = 4
 PLANE_RADIUS = 3
-PLANE_RATIO = 0.12
+PLANE_RATIO = 0.2
 
 
 @njit(nogil=True, cache=True)
@@ -200,37 +200,41 @@ def _clear_ray(
     lost_count: int,
 ) -> int:
     """Lower every cell between laser and end point that this scan has not touched yet."""
-    x0, y0, x1, y1 = ray[0] / resolution, ray[1] / resolution, ray[2] / resolution, ray[3] / resolution
-    gx, gy = math.floor(x0), math.floor(y0)
-    end_x, end_y = math.floor(x1), math.floor(y1)
+    x0, y0 = ray[0] / resolution - origin[0], ray[1] / resolution - origin[1]
+    x1, y1 = ray[2] / resolution - origin[0], ray[3] / resolution - origin[1]
+    x, y = math.floor(x0), math.floor(y0)
     dx, dy = x1 - x0, y1 - y0
     step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
     per_x = abs(1.0 / dx) if dx != 0.0 else 1e30
     per_y = abs(1.0 / dy) if dy != 0.0 else 1e30
-    next_x = ((gx + 1 - x0) if dx > 0 else (x0 - gx)) * per_x
-    next_y = ((gy + 1 - y0) if dy > 0 else (y0 - gy)) * per_y
-    for _ in range(abs(end_x - gx) + abs(end_y - gy)):
-        col, row = gx - origin[0], gy - origin[1]
-        if col < 0 or row < 0 or col >= n or row >= n:
+    next_x = ((x + 1 - x0) if dx > 0 else (x0 - x)) * per_x
+    next_y = ((y + 1 - y0) if dy > 0 else (y0 - y)) * per_y
+    ring_x, ring_y = origin[0] % n, origin[1] % n
+    for _ in range(abs(math.floor(x1) - x) + abs(math.floor(y1) - y)):
+        if x < 0 or y < 0 or x >= n or y >= n:
             return lost_count
-        row, col = gy % n, gx % n
+        col, row = x + ring_x, y + ring_y
+        if col >= n:
+            col -= n
+        if row >= n:
+            row -= n
         if mark[row, col] != tag:
             mark[row, col] = tag
             before = evidence[row, col]
-            after = before - miss
-            if after == 0:
-                after = -1
-            after = max(after, floor)
-            evidence[row, col] = after
-            if before > 0 and after <= 0:
-                averaged[row, col] = 0
-                lost[lost_count, 0], lost[lost_count, 1] = gx, gy
-                lost_count += 1
+            if before > floor:
+                after = before - miss
+                if after == 0:
+                    after = -1
+                evidence[row, col] = max(after, floor)
+                if before > 0 and after <= 0:
+                    averaged[row, col] = 0
+                    lost[lost_count, 0], lost[lost_count, 1] = x + origin[0], y + origin[1]
+                    lost_count += 1
         if next_x < next_y:
-            gx += step_x
+            x += step_x
             next_x += per_x
         else:
-            gy += step_y
+            y += step_y
             next_y += per_y
     return lost_count
 
@@ -306,33 +310,75 @@ def integrate(
 
 
 @njit(nogil=True, cache=True)
+def _clear_cells(window: Any, x0: int, y0: int, x1: int, y1: int) -> None:
+    """Forget the cells of a rectangle."""
+    n = window.evidence.shape[0]
+    for gy in range(y0, y1):
+        row = gy % n
+        for gx in range(x0, x1):
+            col = gx % n
+            window.evidence[row, col] = 0
+            window.averaged[row, col] = 0
+            window.nearest[row, col] = NONE
+            window.normal[row, col] = NONE
+
+
+@njit(nogil=True, cache=True)
+def _spread_cells(window: Any, offsets: Array, x0: int, y0: int, x1: int, y1: int) -> None:
+    """Tell the cells around a rectangle of its occupied cells."""
+    n = window.evidence.shape[0]
+    for gy in range(y0, y1):
+        for gx in range(x0, x1):
+            if window.evidence[gy % n, gx % n] > 0:
+                _spread_new(window.nearest, offsets, n, window.origin, gx, gy)
+
+
+@njit(nogil=True, cache=True)
+def _forget_outside(window: Any, offsets: Array, x0: int, y0: int, x1: int, y1: int) -> None:
+    """Search anew for the cells of a rectangle whose nearest occupied cell has left the window."""
+    n, origin = window.evidence.shape[0], window.origin
+    for gy in range(y0, y1):
+        for gx in range(x0, x1):
+            o = window.nearest[gy % n, gx % n]
+            if o == NONE:
+                continue
+            cx, cy = gx + offsets[o, 0], gy + offsets[o, 1]
+            if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
+                _renew_nearest(window.evidence, window.nearest, offsets, n, origin, gx, gy)
+
+
+@njit(nogil=True, cache=True)
 def shift(window: Any, offsets: Array, new_x: int, new_y: int) -> None:
-    """Move the window: clear what enters, repair the look-up beside it, touch nothing else."""
-    evidence, averaged, nearest = window.evidence, window.averaged, window.nearest
-    normal, origin = window.normal, window.origin
-    n = evidence.shape[0]
+    """Move the window: clear what enters, repair the look-up along the edges, touch nothing else."""
+    n, origin = window.evidence.shape[0], window.origin
     old_x, old_y = origin[0], origin[1]
     origin[0], origin[1] = new_x, new_y
+    x0, x1 = max(old_x, new_x), min(old_x, new_x) + n
+    y0, y1 = max(old_y, new_y), min(old_y, new_y) + n
+    if x0 >= x1 or y0 >= y1:
+        _clear_cells(window, new_x, new_y, new_x + n, new_y + n)
+        return
+    _clear_cells(window, new_x, new_y, new_x + n, y0)
+    _clear_cells(window, new_x, y1, new_x + n, new_y + n)
+    _clear_cells(window, new_x, y0, x0, y1)
+    _clear_cells(window, x1, y0, new_x + n, y1)
     reach = 0
     for o in range(offsets.shape[0]):
         reach = max(reach, offsets[o, 0])
-    for gy in range(new_y, new_y + n):
-        row_is_new = gy < old_y or gy >= old_y + n
-        for gx in range(new_x, new_x + n):
-            if row_is_new or gx < old_x or gx >= old_x + n:
-                row, col = gy % n, gx % n
-                evidence[row, col] = 0
-                averaged[row, col] = 0
-                nearest[row, col] = NONE
-                normal[row, col] = NONE
-    for gy in range(new_y, new_y + n):
-        row_is_deep = gy >= max(old_y, new_y) + reach and gy < min(old_y, new_y) + n - reach
-        for gx in range(new_x, new_x + n):
-            if row_is_deep and gx >= max(old_x, new_x) + reach and gx < min(old_x, new_x) + n - reach:
-                continue
-            if gx < old_x - reach or gx >= old_x + n + reach or gy < old_y - reach or gy >= old_y + n + reach:
-                continue
-            _renew_nearest(evidence, nearest, offsets, n, origin, gx, gy)
+    left, right = (x0, min(x0 + reach, x1)), (max(x1 - reach, x0), x1)
+    low, high = (y0, min(y0 + reach, y1)), (max(y1 - reach, y0), y1)
+    if new_x > old_x:
+        _forget_outside(window, offsets, left[0], y0, left[1], y1)
+        _spread_cells(window, offsets, right[0], y0, right[1], y1)
+    elif new_x < old_x:
+        _forget_outside(window, offsets, right[0], y0, right[1], y1)
+        _spread_cells(window, offsets, left[0], y0, left[1], y1)
+    if new_y > old_y:
+        _forget_outside(window, offsets, x0, low[0], x1, low[1])
+        _spread_cells(window, offsets, x0, high[0], x1, high[1])
+    elif new_y < old_y:
+        _forget_outside(window, offsets, x0, high[0], x1, high[1])
+        _spread_cells(window, offsets, x0, low[0], x1, low[1])
 
 
 @njit(nogil=True, cache=True)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.matching import Match, Matcher
-from lemtomap.grid.motion import Motion, between, compose, inverted, odometry_motion, rotated
+from lemtomap.grid.matching import kernels as matching_kernels
+from lemtomap.grid.motion import between, compose, odometry_uncertainty
 from lemtomap.grid.publish import SmoothCorrection
 from lemtomap.grid.scan import Beams, ScanPreparer
 from lemtomap.grid.window import Scratch, Window, look_up
@@ -61,10 +62,20 @@ class Tracker(ABC):
         self._stamp_s = 0.0
         self._T_grid_integrated = np.zeros(3)
         self._integrated_s = -math.inf
-        self._integrated_scan_distance = 0.0
         self._diversity = 0.0
         self._quality = 0.0
-        self._covariance = np.zeros((3, 3))
+        self._covariance = self._information = np.zeros((3, 3))
+        self._reported: Pose | None = None
+        self._rates = np.array(
+            [
+                config.renew_m,
+                config.renew_rad,
+                config.odometry_m_per_m**2,
+                config.odometry_m_per_rad**2,
+                config.odometry_rad_per_m**2,
+                config.odometry_rad_per_rad**2,
+            ]
+        )
 
     # -- what subclasses say
     # ---------------------------------------------------------------------------------------
@@ -89,23 +100,20 @@ class Tracker(ABC):
         step = between(self._T_odom_base, odometry.T_odom_base)
         self._T_odom_base = odometry.T_odom_base
         self._pending = compose(self._pending, step)
-        motion = odometry_motion(self._pending, self.config)
-        predicted = compose(self._T_grid_base, motion.step)
+        predicted = compose(self._T_grid_base, self._pending)
         if not self._is_due_to_match(scan.stamp_s):
-            return self._report(predicted, motion, matched=False, integrated=False)
-        match = self._track(beams, predicted, motion, abs(float(step[2])))
-        before = self._T_grid_base
+            return self._report(predicted, matched=False, integrated=False)
+        match = self._track(beams, predicted, abs(float(step[2])))
+        self._quality, self._diversity, self._covariance = match.quality, match.diversity, match.covariance
         if not match.accepted:
-            return self._report(predicted, motion, matched=False, integrated=False)
-        self._T_grid_base = match.T_grid_base
-        self._quality, self._diversity = match.quality, match.diversity
+            return self._report(predicted, matched=False, integrated=False)
+        self._T_grid_base, self._information = match.T_grid_base, match.information
         self._pending = np.zeros(3)
-        motion = self._tracked_motion(before, match, motion)
         integrated = self._is_due_to_integrate(scan.stamp_s)
         if integrated:
             self._T_grid_base = self._integrate(beams, match)
             self._T_grid_integrated, self._integrated_s = self._T_grid_base, scan.stamp_s
-        return self._report(self._T_grid_base, motion, matched=True, integrated=integrated)
+        return self._report(self._T_grid_base, matched=True, integrated=integrated)
 
     def view(self) -> GridView:
         """Return the best particle's window."""
@@ -127,8 +135,7 @@ class Tracker(ABC):
         self._T_grid_base = self._T_grid_integrated = odometry.T_odom_base
         self._integrated_s = odometry.stamp_s
         self._T_grid_base = self._integrate(beams, None)
-        motion = Motion(np.zeros(3), np.zeros((3, 3)))
-        return self._report(self._T_grid_base, motion, matched=False, integrated=True)
+        return self._report(self._T_grid_base, matched=False, integrated=True)
 
     def _is_due_to_match(self, stamp_s: float) -> bool:
         x, y, yaw = self._pending.tolist()
@@ -147,26 +154,33 @@ class Tracker(ABC):
             or abs(stamp_s - self._integrated_s) >= self.config.integrate_period_s
         )
 
-    def _track(self, beams: Beams, predicted: Pose, motion: Motion, turn_rad: float) -> Match:
-        information = inverted(rotated(motion.covariance, float(predicted[2])))
+    def _track(self, beams: Beams, predicted: Pose, turn_rad: float) -> Match:
+        uncertainty = odometry_uncertainty(self._pending, self.config)
         reach_rad = 1.6 if turn_rad > self.config.large_turn_rad else 0.0
-        return self._match(beams, predicted, information, self._window(), reach_rad)
+        return self._match(beams, predicted, uncertainty, self._window(), reach_rad)
 
-    def _tracked_motion(self, before: Pose, match: Match, motion: Motion) -> Motion:
-        """Return the motion that odometry and match agree on."""
-        yaw = float(match.T_grid_base[2])
-        prior = inverted(rotated(motion.covariance, yaw))
-        self._covariance = inverted(match.information + prior)
-        return Motion(between(before, match.T_grid_base), rotated(self._covariance, -yaw))
+    def _step_covariance(self, T_grid_base: Pose) -> NDArray[np.float64]:
+        """Return how far the motion since the previous report may be wrong.
 
-    def _report(self, T_grid_base: Pose, motion: Motion, *, matched: bool, integrated: bool) -> SlamUpdate:
+        The windows follow the robot, so what was seen stays right for some metres and then drifts by the
+        error of one match; what the scan cannot see drifts as odometry does.
+        """
+        covariance = np.zeros((3, 3))
+        before = self._reported
+        if before is not None:
+            step = between(before, T_grid_base)
+            matching_kernels.drift(step, float(before[2]), self._information, self._rates, covariance)
+        self._reported = T_grid_base
+        return covariance
+
+    def _report(self, T_grid_base: Pose, *, matched: bool, integrated: bool) -> SlamUpdate:
         T_grid_odom, jumped = self._correction.follow(T_grid_base, self._T_odom_base)
         return SlamUpdate(
             stamp_s=self._stamp_s,
             T_grid_base=T_grid_base,
             T_grid_odom=T_grid_odom,
             covariance=self._covariance,
-            step_covariance=motion.covariance,
+            step_covariance=self._step_covariance(T_grid_base),
             quality=self._quality,
             diversity=self._diversity,
             matched=matched,

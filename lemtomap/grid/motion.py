@@ -4,19 +4,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lemtomap.grid.config import SlamConfig
 from lemtomap.se2 import Pose
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
-    """A step in the frame it started from, with its covariance there."""
+class Uncertainty:
+    """How far a step of odometry may be wrong, the same along x and y."""
 
-    step: Pose
-    covariance: NDArray[np.float64]
-    """float64 (3, 3), m, m, rad."""
+    sigma_m: float
+    sigma_rad: float
 
 
 def compose(T_a_b: Pose, T_b_c: Pose) -> Pose:
@@ -37,24 +35,11 @@ def between(T_w_a: Pose, T_w_b: Pose) -> Pose:
     return np.array([c * (u - x) + s * (v - y), -s * (u - x) + c * (v - y), total])
 
 
-def odometry_motion(step: Pose, config: SlamConfig) -> Motion:
-    """Return a step of the odometry with the error that its length and turn allow."""
+def odometry_uncertainty(step: Pose, config: SlamConfig) -> Uncertainty:
+    """Return the error that the length and turn of a step allow."""
     x, y, yaw = step.tolist()
     way, turn = math.hypot(x, y), abs(yaw)
-    sigma_m = config.odometry_floor_m + config.odometry_m_per_m * way + config.odometry_m_per_rad * turn
-    sigma_rad = (
-        config.odometry_floor_rad + config.odometry_rad_per_rad * turn + config.odometry_rad_per_m * way
+    return Uncertainty(
+        config.odometry_floor_m + config.odometry_m_per_m * way + config.odometry_m_per_rad * turn,
+        config.odometry_floor_rad + config.odometry_rad_per_rad * turn + config.odometry_rad_per_m * way,
     )
-    return Motion(step, np.diag([sigma_m**2, sigma_m**2, sigma_rad**2]))
-
-
-def rotated(covariance: NDArray[np.float64], yaw_rad: float) -> NDArray[np.float64]:
-    """Return a covariance of [dx, dy, dyaw] with its axes turned by yaw."""
-    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(turn @ covariance @ turn.T)
-
-
-def inverted(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the inverse of a symmetric positive definite 3 x 3 matrix."""
-    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)

@@ -13,6 +13,7 @@ from lemtomap.se2 import Pose
 from lemtomap.types import GridView
 
 UNKNOWN_PERCENT = -1
+OFF_CENTRE_SHARE = 0.5  # of half the window, that the robot may be off its middle
 LOG_ODDS_PER_EVIDENCE = 0.5  # evidence 12 of 12 shows as 100 %, -5 as 8 %
 
 
@@ -88,6 +89,11 @@ class Window:
         )
 
     @property
+    def cells(self) -> int:
+        """Return the number of cells along one side."""
+        return int(self.arrays.evidence.shape[0])
+
+    @property
     def nbytes(self) -> int:
         """Return the memory of the cells."""
         return sum(array.nbytes for array in self.arrays)
@@ -98,17 +104,19 @@ class Window:
             getattr(self.arrays, name)[...] = getattr(other.arrays, name)
 
     def holds(self, beams: Beams, T_grid_base: Pose) -> bool:
-        """Tell whether robot and scan fall inside."""
-        n = self.arrays.evidence.shape[0]
-        origin = self.arrays.origin
-        return not (
-            kernels.outside(beams.hits, T_grid_base, origin, n, self.resolution_m)
-            or kernels.outside(beams.cuts, T_grid_base, origin, n, self.resolution_m)
-        )
+        """Tell whether every hit falls inside and the robot is not far from the middle.
+
+        Beams that saw nothing may reach beyond: what they prove is worth less than what a shift would forget.
+        """
+        half_m = 0.5 * self.resolution_m * self.cells
+        off_x, off_y = T_grid_base[:2] - self.resolution_m * self.arrays.origin - half_m
+        if max(abs(off_x), abs(off_y)) > OFF_CENTRE_SHARE * half_m:
+            return False
+        return not kernels.outside(beams.hits, T_grid_base, self.arrays.origin, self.cells, self.resolution_m)
 
     def centred_origin(self, T_grid_base: Pose) -> tuple[int, int]:
         """Return the origin, cells, that puts the robot in the middle."""
-        half = self.arrays.evidence.shape[0] // 2
+        half = self.cells // 2
         return (
             math.floor(T_grid_base[0] / self.resolution_m) - half,
             math.floor(T_grid_base[1] / self.resolution_m) - half,

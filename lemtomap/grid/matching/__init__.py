@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.matching import kernels
+from lemtomap.grid.motion import Uncertainty
 from lemtomap.grid.scan import Beams
 from lemtomap.grid.window import LookUp, Window
 from lemtomap.se2 import Pose
@@ -25,7 +26,7 @@ class Rules(NamedTuple):
     resolution_m: float
     sigma_m: float
     noise_m: float
-    point_share: float
+    point_weight: float
     degenerate_below: float
     newton_rounds: int
     climb_below: float
@@ -44,6 +45,8 @@ class Match:
     T_grid_base: Pose
     information: NDArray[np.float64]
     """float64 (3, 3) of the scan alone, grid axes: zero along what it cannot see."""
+    covariance: NDArray[np.float64]
+    """float64 (3, 3) of scan and odometry together, grid axes."""
     quality: float
     diversity: float
     accepted: bool
@@ -59,7 +62,7 @@ class Matcher:
             config.resolution_m,
             config.match_sigma_m,
             config.match_noise_m,
-            config.point_share,
+            config.point_weight,
             config.degenerate_below,
             NEWTON_ROUNDS,
             config.climb_below,
@@ -75,20 +78,20 @@ class Matcher:
         self,
         beams: Beams,
         prior: Pose,
-        prior_information: NDArray[np.float64],
+        uncertainty: Uncertainty,
         window: Window,
         reach_rad: float = 0.0,
     ) -> Match:
         """Return the pose that scan and prior agree on; reach_rad > 0 asks for headings that far round to
         be tried.
         """
-        out = np.empty(14)
+        out = np.empty(23)
         if len(beams.hits) < self._min_points:
-            return Match(prior, np.zeros((3, 3)), 0.0, 0.0, accepted=False)
+            return refused(prior, uncertainty)
         kernels.match(
             beams.hits,
             prior,
-            prior_information,
+            (1.0 / uncertainty.sigma_m**2, 1.0 / uncertainty.sigma_rad**2),
             window.arrays,
             self._tables,
             self._rules,
@@ -96,5 +99,12 @@ class Matcher:
             SWEEP_REACH_M if reach_rad > 0.0 else 0.0,
             out,
         )
-        accepted = bool(out[12] >= self._min_quality)
-        return Match(out[:3], out[3:12].reshape(3, 3), float(out[12]), float(out[13]), accepted)
+        quality, diversity = out[21:].tolist()
+        information, covariance = out[3:12].reshape(3, 3), out[12:21].reshape(3, 3)
+        return Match(out[:3], information, covariance, quality, diversity, quality >= self._min_quality)
+
+
+def refused(prior: Pose, uncertainty: Uncertainty) -> Match:
+    """Return what is known when there is nothing to match: odometry alone."""
+    covariance = np.diag([uncertainty.sigma_m**2, uncertainty.sigma_m**2, uncertainty.sigma_rad**2])
+    return Match(prior, np.zeros((3, 3)), covariance, 0.0, 0.0, accepted=False)

@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+Pair = tuple[float, float]
 
 NONE = 255
 
@@ -20,13 +21,13 @@ NONE = 255
 @njit(nogil=True, cache=True)
 def _linearise(
     points: Array, pose: Array, window: Any, tables: Any, rules: Any, sigma: float, H: Array, b: Array
-) -> tuple[float, float, float, float]:
+) -> float:
     """Sum the normal equations of the match at pose; return (weight of matched points, weighted surface
     spread).
     """
     mean, nearest, normal, origin = window.mean, window.nearest, window.normal, window.origin
     offsets, normals = tables.offsets, tables.normals
-    resolution, point_share = rules.resolution_m, rules.point_share
+    resolution, point_weight = rules.resolution_m, rules.point_weight
     n = nearest.shape[0]
     H[:] = 0.0
     b[:] = 0.0
@@ -38,7 +39,6 @@ def _linearise(
     per_metre = 1.0 / resolution
     scale = -0.5 / (sigma * sigma)
     hxx = hxy = hyy = hxt = hyt = htt = bx = by = bt = 0.0
-    nxx = nxy = nyy = 0.0
     for i in range(points.shape[0]):
         rx = c * points[i, 0] - s * points[i, 1]
         ry = s * points[i, 0] + c * points[i, 1]
@@ -75,17 +75,10 @@ def _linearise(
         total += w
         if k != NONE:
             nx, ny = normals[k, 0], normals[k, 1]
-            wxx = w * (nx * nx + point_share * ny * ny)
-            wxy = w * (nx * ny - point_share * nx * ny)
-            wyy = w * (ny * ny + point_share * nx * nx)
-            nxx += w * nx * nx
-            nxy += w * nx * ny
-            nyy += w * ny * ny
+            wxx, wxy, wyy = w * nx * nx, w * nx * ny, w * ny * ny
         else:
-            wxx = wyy = 0.5 * w
+            wxx = wyy = point_weight * w
             wxy = 0.0
-            nxx += 0.5 * w
-            nyy += 0.5 * w
         jx, jy = -ry, rx
         gx, gy = wxx * ex + wxy * ey, wxy * ex + wyy * ey
         hxx += wxx
@@ -101,12 +94,13 @@ def _linearise(
     H[1, 0], H[1, 1], H[1, 2] = hxy, hyy, hyt
     H[2, 0], H[2, 1], H[2, 2] = hxt, hyt, htt
     b[0], b[1], b[2] = bx, by, bt
-    return total, nxx, nxy, nyy
+    return total
 
 
 @njit(nogil=True, cache=True)
-def _gate(H: Array, b: Array, nxx: float, nxy: float, nyy: float, gate: float) -> float:
+def _gate(H: Array, b: Array, gate: float) -> float:
     """Drop what the match says along the weak axis of the surfaces; return the diversity 0..1."""
+    nxx, nxy, nyy = H[0, 0], H[0, 1], H[1, 1]  # the spread of surface directions
     middle = 0.5 * (nxx + nyy)
     half = 0.5 * (nxx - nyy)
     root = math.sqrt(half * half + nxy * nxy)
@@ -131,7 +125,7 @@ def _gate(H: Array, b: Array, nxx: float, nxy: float, nyy: float, gate: float) -
         H[2, 0], H[2, 1] = h02, h12
         b0, b1 = b[0], b[1]
         b[0], b[1] = pxx * b0 + pxy * b1, pxy * b0 + pyy * b1
-    return diversity
+    return float(diversity)
 
 
 @njit(nogil=True, cache=True)
@@ -193,21 +187,16 @@ def score(
 
 
 @njit(nogil=True, cache=True)
-def _unlikelihood(x: float, y: float, yaw: float, prior: Array, prior_info: Array) -> float:
+def _unlikelihood(x: float, y: float, yaw: float, prior: Array, prior_info: Pair) -> float:
     """Return the squared Mahalanobis distance of a pose from the prior."""
     dx, dy = x - prior[0], y - prior[1]
     dt = (yaw - prior[2] + math.pi) % (2.0 * math.pi) - math.pi
-    return float(
-        prior_info[0, 0] * dx * dx
-        + prior_info[1, 1] * dy * dy
-        + prior_info[2, 2] * dt * dt
-        + 2.0 * (prior_info[0, 1] * dx * dy + prior_info[0, 2] * dx * dt + prior_info[1, 2] * dy * dt)
-    )
+    return float(prior_info[0] * (dx * dx + dy * dy) + prior_info[1] * dt * dt)
 
 
 @njit(nogil=True, cache=True)
 def _climb(
-    points: Array, pose: Array, prior: Array, prior_info: Array, window: Any, tables: Any, rules: Any
+    points: Array, pose: Array, prior: Array, prior_info: Pair, window: Any, tables: Any, rules: Any
 ) -> None:
     """Walk uphill from pose (changed in place) in ever smaller steps."""
     resolution, trust = rules.resolution_m, rules.climb_trust
@@ -244,7 +233,7 @@ def _sweep(
     points: Array,
     pose: Array,
     prior: Array,
-    prior_info: Array,
+    prior_info: Pair,
     window: Any,
     tables: Any,
     rules: Any,
@@ -272,7 +261,7 @@ def _refine(
     points: Array,
     pose: Array,
     prior: Array,
-    prior_info: Array,
+    prior_info: Pair,
     window: Any,
     tables: Any,
     rules: Any,
@@ -289,14 +278,20 @@ def _refine(
     sigma = rules.sigma_m
     width = 2.0 * sigma
     for _ in range(rules.newton_rounds):
-        total, nxx, nxy, nyy = _linearise(points, pose, window, tables, rules, width, H, b)
-        _gate(H, b, nxx, nxy, nyy, rules.degenerate_below)
+        total = _linearise(points, pose, window, tables, rules, width, H, b)
+        _gate(H, b, rules.degenerate_below)
         dx, dy = prior[0] - pose[0], prior[1] - pose[1]
         dt = (prior[2] - pose[2] + math.pi) % (2.0 * math.pi) - math.pi
         for i in range(3):
-            g[i] = b[i] * per_variance + prior_info[i, 0] * dx + prior_info[i, 1] * dy + prior_info[i, 2] * dt
+            g[i] = b[i] * per_variance
             for j in range(3):
-                A[i, j] = H[i, j] * per_variance + prior_info[i, j]
+                A[i, j] = H[i, j] * per_variance
+        g[0] += prior_info[0] * dx
+        g[1] += prior_info[0] * dy
+        g[2] += prior_info[1] * dt
+        A[0, 0] += prior_info[0]
+        A[1, 1] += prior_info[0]
+        A[2, 2] += prior_info[1]
         if not _solve(A, g, step):
             break
         pose[0] += step[0]
@@ -307,8 +302,8 @@ def _refine(
             width = max(sigma, 0.5 * width)
         elif small:
             break
-    total, nxx, nxy, nyy = _linearise(points, pose, window, tables, rules, sigma, H, b)
-    diversity = _gate(H, b, nxx, nxy, nyy, rules.degenerate_below)
+    total = _linearise(points, pose, window, tables, rules, sigma, H, b)
+    diversity = _gate(H, b, rules.degenerate_below)
     for i in range(3):
         for j in range(3):
             H[i, j] *= per_variance
@@ -319,7 +314,7 @@ def _refine(
 def match(
     points: Array,
     prior: Array,
-    prior_info: Array,
+    prior_info: Pair,
     window: Any,
     tables: Any,
     rules: Any,
@@ -329,10 +324,11 @@ def match(
 ) -> None:
     """Match points (N, 2) of base against a window.
 
-    prior (3,) T_grid_base, prior_info (3, 3) its information. reach > 0 asks for a search that wide when
-    the plain match is poor. out (14,): pose, the match's own information (9), quality, diversity.
+    prior (3,) T_grid_base; prior_info: its information along x and y (1/m^2) and in yaw (1/rad^2). reach > 0
+    asks for a search that wide before the climb. out (23,): pose, the match's own information (9), covariance
+    with the prior (9), quality, diversity.
     """
-    pose, H = out[0:3], out[3:12].reshape(3, 3)
+    pose, H, covariance = out[0:3], out[3:12].reshape(3, 3), out[12:21].reshape(3, 3)
     pose[:] = prior
     quality, diversity = _refine(points, pose, prior, prior_info, window, tables, rules, H)
     if quality < rules.climb_below or reach_rad > 0.0:
@@ -348,4 +344,48 @@ def match(
             pose[:] = rival
             H[:] = rival_H
             quality, diversity = rival_quality, rival_diversity
-    out[12], out[13] = quality, diversity
+    A = H.copy()
+    A[0, 0] += prior_info[0]
+    A[1, 1] += prior_info[0]
+    A[2, 2] += prior_info[1]
+    invert(A, covariance)
+    out[21], out[22] = quality, diversity
+
+
+@njit(nogil=True, cache=True)
+def invert(A: Array, out: Array) -> None:
+    """Write the inverse of a symmetric positive definite 3 x 3 matrix."""
+    unit = np.zeros(3)
+    for i in range(3):
+        unit[:] = 0.0
+        unit[i] = 1.0
+        _solve(A, unit, out[i])
+
+
+@njit(nogil=True, cache=True)
+def drift(step: Array, yaw: float, information: Array, rates: Array, out: Array) -> None:
+    """Write the covariance (3, 3) of one step, axes of the base before it.
+
+    information (3, 3) of the latest match, grid axes; yaw of that base in grid. rates (6,): metres of travel and
+    radians of turn after which the window is new ground; odometry's variance in place per metre and per radian,
+    and in yaw per metre and per radian.
+    """
+    way, turn = math.hypot(step[0], step[1]), abs(step[2])
+    A = np.zeros((3, 3))
+    renewed = max(way / rates[0] + turn / rates[1], 1e-9)
+    c, s = math.cos(yaw), math.sin(yaw)
+    for i in range(3):
+        for j in range(3):
+            A[i, j] = information[i, j] / renewed
+    ax = c * A[0, 0] + s * A[1, 0], c * A[0, 1] + s * A[1, 1]
+    ay = c * A[1, 0] - s * A[0, 0], c * A[1, 1] - s * A[0, 1]
+    tx, ty = A[0, 2], A[1, 2]
+    A[0, 0], A[0, 1] = ax[0] * c + ax[1] * s, ax[1] * c - ax[0] * s
+    A[1, 0], A[1, 1] = A[0, 1], ay[1] * c - ay[0] * s
+    A[0, 2], A[1, 2] = c * tx + s * ty, c * ty - s * tx
+    A[2, 0], A[2, 1] = A[0, 2], A[1, 2]
+    place = 1.0 / max(rates[2] * way + rates[3] * turn, 1e-12)
+    A[0, 0] += place
+    A[1, 1] += place
+    A[2, 2] += 1.0 / max(rates[4] * way + rates[5] * turn, 1e-12)
+    invert(A, out)
