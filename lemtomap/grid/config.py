@@ -52,8 +52,8 @@ class SlamConfig:
     odometry_rad_per_m: float = 0.1
 
     # drift of the window's frame: after so much travel or turning it is off by the error of one more match
-    renew_m: float = 2.0
-    renew_rad: float = 3.0
+    renew_m: float = 1.2
+    renew_rad: float = 2.0
 
     # particles
     sample_share: float = 0.5  # of the proposal's standard deviation that is sampled

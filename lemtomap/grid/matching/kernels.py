@@ -366,9 +366,9 @@ def invert(A: Array, out: Array) -> None:
 def drift(step: Array, yaw: float, information: Array, rates: Array, out: Array) -> None:
     """Write the covariance (3, 3) of one step, axes of the base before it.
 
-    information (3, 3) of the latest match, grid axes; yaw of that base in grid. rates (6,): metres of travel and
-    radians of turn after which the window is new ground; odometry's variance in place per metre and per radian,
-    and in yaw per metre and per radian.
+    information (3, 3) of the latest match, grid axes; yaw of that base in grid. rates (6,): metres of travel
+    and radians of turn after which the window is new ground; odometry's variance in place per metre and per
+    radian, and in yaw per metre and per radian.
     """
     way, turn = math.hypot(step[0], step[1]), abs(step[2])
     A = np.zeros((3, 3))
