@@ -1,11 +1,15 @@
 """Everything a run with a robot, real or simulated, leaves in its folder."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, MapView
 from robot import outputs
 from robot.core import Effort, RobotCore
@@ -50,15 +54,24 @@ class RunFiles(Onlooker):
         self._begun = _Clock()
         self._walls = WallSketch()
         self._walls_due_s, self._preview_due_s = 0.0, PREVIEW_PERIOD_S
-        viewer = Viewer(out / "run.rrd", live=live)
+        self._truth: Callable[[], Pose | None] | None = None
+        self._view = Viewer(out / "run.rrd", live=live)
         recorder = Recorder(out / "run.mcap", {"title": title})
-        super().__init__(core.exchange, core.efforts, viewer, recorder, listener.say)
+        super().__init__(core.exchange, core.efforts, self._view, recorder, listener.say)
+
+    def show_world(self, outlines: Sequence[NDArray[np.float64]], truth: Callable[[], Pose | None]) -> None:
+        """Show a simulated building, and from now on where the robot truly is in it, T_world_base."""
+        self._truth = truth
+        self._view.show_world(outlines)
 
     def look(self, now_s: float) -> None:
         """Show and record what is new; now and then keep a scan for the picture."""
         super().look(now_s)
         self._listener.look(now_s)
         view, scan = self._core.exchange.map_view.get(), self._core.exchange.last_scan.get()
+        true = self._truth() if self._truth is not None else None
+        if view is not None and true is not None:
+            self._view.show_truth(now_s, true, view.T_grid_base)
         if view is not None and now_s >= self._preview_due_s:
             self._preview_due_s = now_s + PREVIEW_PERIOD_S
             draw_preview(self._out / "overview.png", view)

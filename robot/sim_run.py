@@ -16,6 +16,7 @@ from robot.runtime import Ports, Runtime
 from robot.sim_server import FakeHardware
 from robot.warmup import warm_up
 from sim import worlds
+from sim.picture import outlines
 from sim.simulator import Simulator
 
 LOOK_PERIOD_S = 0.1
@@ -60,6 +61,7 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
 def _drive_fast(options: SimOptions, run: Run) -> None:
     """Run in lock-step on a virtual clock."""
     simulator = Simulator(worlds.load(options.world), options.seed, gui=options.gui)
+    run.files.show_world(outlines(simulator.world), lambda: simulator.truth().T_world_base)
     look_at_s = 0.0
 
     def watch(now_s: float) -> None:
@@ -88,6 +90,7 @@ def _drive_in_real_time(options: SimOptions, run: Run) -> None:
     """Run on the wall clock, the simulator in a process of its own behind pseudo-terminals."""
     warm_up(run.plan.config, options.slam)
     with FakeHardware(options.world, options.seed, gui=options.gui) as hardware:
+        run.files.show_world(outlines(worlds.load(options.world)), hardware.true_pose)
         ports = Ports(lambda: open_serial(hardware.kobuki), lambda: open_serial(hardware.hokuyo))
         runtime = Runtime(run.core, ports, run.files)
         ended = runtime.run(parse_mission(options.mission), options.duration_s)

@@ -19,6 +19,7 @@ from lemtomap.nav.types import CostmapView
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, GridView, MapView, Twist
 from robot.viewer_layout import ABOUT, EDGE_COLOURS, blueprint
+from robot.viewer_truth import TruthView
 
 PATHS = NDArray[np.floating]
 
@@ -67,6 +68,7 @@ class Viewer:
         self._due: dict[str, float] = {}
         self._trail: deque[tuple[float, float, float]] = deque(maxlen=TRAIL_LENGTH)
         self._state = ""
+        self._truth: TruthView | None = None
         self._stream = rr.RecordingStream("lemtomap", make_default=False)
         sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(recording))]
         if live:
@@ -146,6 +148,17 @@ class Viewer:
         """Show one log line; `level` is DEBUG, INFO, WARN or ERROR. Never limited."""
         self._at(now_s)
         self._stream.log(f"log/{source}", rr.TextLog(text, level=level))
+
+    def show_world(self, outlines: Sequence[NDArray[np.float64]]) -> None:
+        """Show a simulated building, outlines of float64 (N, 2) metres, in a tab of its own."""
+        self._truth = TruthView(self._stream, outlines)
+        self._stream.send_blueprint(blueprint((*self._truth.middle_m.tolist(), self._truth.extent_m)))
+
+    def show_truth(self, now_s: float, T_world_base: Pose, T_grid_base: Pose) -> None:
+        """Show where a simulated robot truly is beside where it believes to be. Needs show_world before."""
+        self._at(now_s)
+        if self._truth is not None and self._is_due("truth", now_s, self._config.window_hz):
+            self._truth.show(now_s, T_world_base, T_grid_base)
 
     def close(self) -> None:
         """Finish the recording; later calls do nothing useful."""

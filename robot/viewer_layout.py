@@ -29,15 +29,24 @@ ABOUT = """\
 | pink line | the route over nodes |
 | green line, green dot | the way to the sliding goal |
 
+In a simulated run the tab *Truth* shows the building as it is,
+the true track (green) and the believed one (orange).
+
 Press play, or drag the time line below.
 """
 
 
-def blueprint() -> rrb.Blueprint:
-    """Return the default screen: the map large, beside it costmap, velocities and timing, the log below."""
+def blueprint(world: tuple[float, float, float] | None = None) -> rrb.Blueprint:
+    """Return the default screen: the map large, beside it costmap, velocities and timing, the log below.
+
+    `world` is the middle x, y and the extent of a simulated building, metres: it gets a tab of its own.
+    """
     plots = rrb.Vertical(
         rrb.Tabs(
-            _costmap_view(), rrb.TextDocumentView(origin="about", name="How to read this"), active_tab=0
+            _costmap_view(),
+            *([_truth_view(*world)] if world is not None else []),
+            rrb.TextDocumentView(origin="about", name="How to read this"),
+            active_tab=0,
         ),
         rrb.TimeSeriesView(origin="velocity/forward", name="Forward speed (m/s)"),
         rrb.TimeSeriesView(origin="velocity/turn", name="Turn rate (rad/s)"),
@@ -96,12 +105,23 @@ def _costmap_view() -> rrb.Spatial3DView:
     )
 
 
-def _eye(height_m: float) -> rrb.EyeControls3D:
-    """Return an eye straight above the origin, x to the right."""
+def _truth_view(x_m: float, y_m: float, extent_m: float) -> rrb.Spatial3DView:
+    """Return the simulated building from above, with the true and the believed track."""
+    return rrb.Spatial3DView(
+        origin="truth",
+        name="Truth (simulator)",
+        eye_controls=_eye(1.1 * extent_m, x_m, y_m),
+        line_grid=False,
+        background=[38, 42, 48],
+    )
+
+
+def _eye(height_m: float, x_m: float = 0.0, y_m: float = 0.0) -> rrb.EyeControls3D:
+    """Return an eye straight above a point, x to the right."""
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
-        position=[0.0, -0.01, height_m],
-        look_target=[0.0, 0.0, 0.0],
+        position=[x_m, y_m - 0.01, height_m],
+        look_target=[x_m, y_m, 0.0],
         eye_up=[0.0, 1.0, 0.0],
     )
 

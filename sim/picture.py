@@ -74,6 +74,12 @@ def draw(world: World, axis: Any, track: NDArray[np.float64] | None = None) -> N
     axis.tick_params(labelsize=6)
 
 
+def outlines(world: World) -> list[NDArray[np.float64]]:
+    """Return what belongs into a plan as closed outlines, float64 (5, 2) each, metres, world frame."""
+    drawn = [box for box in world.boxes if _is_drawn(box)]
+    return [np.concatenate([corners, corners[:1]]) for corners in map(_outline, drawn)]
+
+
 def _is_drawn(box: Box) -> bool:
     """Tell whether a box belongs into a plan: no ceilings; of the floor only ramps."""
     return box.centre[2] < 1.5 and (box.surface is not Surface.FLOOR or box.pitch_rad != 0.0)
