@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lemtomap.se2 import Pose, compose, inverse
 from lemtomap.topo.layout import lay_out, trajectory
 from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.smooth import smooth
 from lemtomap.types import EdgeType
 
 
@@ -39,16 +40,24 @@ class FinalMap:
         return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
-def final_map(mapper: TopoMapper) -> FinalMap:
-    """Place everything the mapper knows; needs at least one scan."""
-    layout = lay_out(mapper.store)
-    stamps_s, T_map_base = trajectory(layout, mapper.trail)
+def final_map(mapper: TopoMapper, *, whole_drive: bool = True) -> FinalMap:
+    """Place everything the mapper knows; needs at least one scan.
+
+    `whole_drive`: the map began empty with this drive, so that every scan may be fitted, not only every node.
+    """
     view = mapper.view()
+    if whole_drive:
+        smoothed = smooth(mapper.store, mapper.trail)
+        T_map_node, stamps_s, T_map_base = smoothed.T_map_node, smoothed.stamps_s, smoothed.T_map_base
+    else:
+        layout = lay_out(mapper.store)
+        T_map_node = layout.T_map_node
+        stamps_s, T_map_base = trajectory(layout, mapper.trail)
     here = view.associated_id
     return FinalMap(
-        T_map_node=layout.T_map_node,
+        T_map_node=T_map_node,
         edges=[(edge.source_id, edge.target_id, edge.type) for edge in mapper.store.edges()],
         stamps_s=stamps_s,
         T_map_base=T_map_base,
-        T_map_grid=compose(layout.T_map_node[here], inverse(view.T_grid_node[here])),
+        T_map_grid=compose(T_map_node[here], inverse(view.T_grid_node[here])),
     )

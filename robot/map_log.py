@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lemtomap.grid import GridSlam, GrowingGmapping, RollingGmapping, SlamConfig, WindowMatcher
 from lemtomap.pipeline import Mapper
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.loops.recogniser import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType, GridView, MapView, Odometry, Scan, SlamUpdate
@@ -98,7 +99,8 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
     read_cpu_s = time.process_time() - begun_cpu_s
     with outputs.staged(options.out) as stage:
         slam = _Timed(SLAMS[options.slam](config, options.seed))
-        topo = TopoMapper(TopoConfig(), TopoStore.create(stage / "map.lemto", durable=False))
+        store = TopoStore.create(stage / "map.lemto", durable=False)
+        topo = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
         try:
             drive = _drive(log, Mapper(slam, topo), slam, bar)
             final, view = final_map(topo), topo.view()
