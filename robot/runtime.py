@@ -12,6 +12,7 @@ import asyncio
 import contextlib
 import sys
 import threading
+import time
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 
@@ -67,6 +68,8 @@ class Runtime:
         )
         self._base_events: list[KobukiEvent] = []
         self._laser_events: list[HokuyoEvent] = []
+        self.loop_cpu_s = 0.0
+        """CPU time of the loop thread: both drivers and the base step."""
         self._cycle_at_s = 0.0
         self._cycle_due = False
         self._crash: BaseException | None = None
@@ -100,6 +103,7 @@ class Runtime:
     # ---- the loop thread ----
 
     async def _loop(self, threads: list[threading.Thread], duration_s: float) -> Ended:
+        begun_s = time.thread_time()
         drivers = [asyncio.create_task(self._kobuki.run()), asyncio.create_task(self._hokuyo.run())]
         output = asyncio.create_task(self._output(duration_s))
         for thread in threads:
@@ -114,6 +118,7 @@ class Runtime:
             for task in (output, *drivers):
                 task.cancel()
             await asyncio.gather(output, *drivers, return_exceptions=True)
+            self.loop_cpu_s = time.thread_time() - begun_s
         self._raise_first(output, *drivers)
         return self._ended()
 
