@@ -68,6 +68,7 @@ class Runtime:
         )
         self._base_events: list[KobukiEvent] = []
         self._laser_events: list[HokuyoEvent] = []
+        self._lost: list[str] = []
         self.loop_cpu_s = 0.0
         """CPU time of the loop thread: both drivers and the base step."""
         self._cycle_at_s = 0.0
@@ -138,7 +139,11 @@ class Runtime:
             self._port_changed(KOBUKI, event)
             return
         self._base_events.append(event)  # type: ignore[arg-type]
-        if not self._cycle_due:  # after the whole packet was taken, before anything else
+        self._soon()
+
+    def _soon(self) -> None:
+        """Command the base as soon as the whole packet is taken, before anything else."""
+        if not self._cycle_due:
             self._cycle_due = True
             asyncio.get_running_loop().call_soon(self._cycle)
 
@@ -151,8 +156,8 @@ class Runtime:
     def _cycle(self) -> None:
         self._cycle_due = False
         now_s = self._cycle_at_s = self.clock.now_s()
-        samples = Samples(self._base_events, self._laser_events)
-        self._base_events, self._laser_events = [], []
+        samples = Samples(self._base_events, self._laser_events, self._lost)
+        self._base_events, self._laser_events, self._lost = [], [], []
         self.core.take(samples, now_s)
         commands = self.core.command(now_s)
         self._send(self._kobuki.session.drive(commands.drive.v_mps, commands.drive.w_radps), now_s)
@@ -170,6 +175,8 @@ class Runtime:
         opened = isinstance(event, PortOpened)
         self.onlooker.raw.put(Entry(device, Call.PORT, stamp_ns(event.stamp_s), OPENED if opened else LOST))
         if isinstance(event, PortLost):
+            self._lost.append(device)
+            self._soon()
             self.core.exchange.note(event.stamp_s, device, str(event.error), Level.WARN)
 
     def _raise_first(self, *tasks: "asyncio.Task[None]") -> None:

@@ -1,12 +1,12 @@
 """The robot in real time against the clock: reactions, unplugged cables, processor shares, sudden death.
 
     python tools/bench_runtime.py bumps [1000]     bumper bit in a packet -> stop command's bytes on the wire
-    python tools/bench_runtime.py plugs [20]       each plug pulled so often while driving: stop, data back, leaks
+    python tools/bench_runtime.py plugs [40]       plugs pulled so often while driving: stop, data back, leaks
     python tools/bench_runtime.py cpu [60]         shares of one core over so many seconds of a mission
     python tools/bench_runtime.py kill             kill -9 while driving; then the next start
-    python tools/bench_runtime.py noise [180]      a mission with lost bytes, flipped bits and bursts, in lock-step
+    python tools/bench_runtime.py noise [180]      a mission with lost bytes, flipped bits, bursts (lock-step)
 
-Everything but `noise` runs on pseudo-terminals with the fake hardware in a process of its own, and maps meanwhile.
+Everything but `noise` runs on pseudo-terminals with the fake hardware in a process of its own, and maps.
 """
 
 import json
@@ -96,9 +96,8 @@ def real_run(hardware: Hardware, mission: Mission, duration_s: float, *, circle:
 def row(name: str, values: Sequence[float], unit: str = "ms", scale: float = 1e3) -> None:
     """Print one measured distribution."""
     v = scale * np.array(values)
-    print(
-        f"{name:34} n {len(v):5}  median {np.median(v):8.1f}  p99 {np.percentile(v, 99):8.1f}  max {v.max():8.1f} {unit}"
-    )
+    median, worst = np.median(v), np.percentile(v, 99)
+    print(f"{name:34} n {len(v):5}  median {median:8.1f}  p99 {worst:8.1f}  max {v.max():8.1f} {unit}")
 
 
 def measure_events(what: str, count: int) -> None:
@@ -114,9 +113,7 @@ def measure_events(what: str, count: int) -> None:
     for name, values in told["measured"].items():
         row(name, values)
     print(f"scans mapped {runtime.core.mapping.scans}; dropped {runtime.core.exchange.dropped()}")
-    print(
-        f"file descriptors {before[0]} -> {after[0]}, threads {before[1]} -> {after[1]}; lost_s {told['lost_s']:.2f}"
-    )
+    print(f"file descriptors {before[0]} -> {after[0]}, threads {before[1]} -> {after[1]}")
 
 
 def measure_cpu(seconds: float) -> None:

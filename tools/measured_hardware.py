@@ -1,4 +1,4 @@
-"""The fake robot with a stopwatch: serves both ports, presses the bumper, pulls the plugs, and times what follows.
+"""The fake robot with a stopwatch: serves both ports, presses the bumper, pulls plugs, and times it.
 
     python tools/measured_hardware.py bumps 100      press the front bumper 100 times while it drives forward
     python tools/measured_hardware.py plugs 20       pull each plug 20 times while it drives
