@@ -3,8 +3,8 @@
     python tools/bench_revisit.py [--world office | plan.yaml | plan.yaml@4] [--metres 40] [--seeds 3]
 
 The robot drives to a place and back, twice (the thesis' errand), with slipping wheels, a biased gyro and
-a noisy laser; loop closing is off. For every scan: how far is the associated node from where it truly is, seen from
-the robot? Is it the nearest node the robot could see? Does a near-neighbour edge cross a wall? Truth is used
+a noisy laser; loop closing is off. For every scan: how far is the associated node from where it truly is, as
+seen from the robot? Is it the nearest node in sight? Does a near-neighbour edge cross a wall? Truth is used
 here only to judge.
 """
 

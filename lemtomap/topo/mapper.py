@@ -95,7 +95,7 @@ class TopoMapper:
         self.config = config
         self.store = store
         self.graph = PagedGraph(store, config.paged_nodes)
-        self.local = LocalMap(self.graph, config.local_radius_m, config.local_limit)
+        self.local = LocalMap(self.graph, config)
         self.keeper = PlaceKeeper(config, self.graph, recogniser.describe if recogniser else None)
         self.trail = ScanTrail.temporary() if trail is None else trail
         self.level = level
@@ -178,6 +178,7 @@ class TopoMapper:
         from_base, to_base = before.T_grid_base, after.T_grid_base
         self._drift = kernels.drifted(self._drift, from_base, to_base, after.step_covariance)
         self.travelled_m += math.hypot(to_base[0] - from_base[0], to_base[1] - from_base[1])
+        self.local.way_m = self.travelled_m
 
     def _associate_or_create(self) -> None:
         """Only a neighbour or a new node can come next, and only one that no wall hides.
@@ -223,8 +224,8 @@ class TopoMapper:
         self._associated_id = node_id
         node = self.graph.node(node_id)
         self.graph.put_node(replace(node, visits=node.visits + 1))
-        self._align_associated()
         self._take_places()
+        self._align_associated()
         if self._recogniser is not None:
             self._recogniser.at_node(self, born=False)
 
@@ -234,12 +235,12 @@ class TopoMapper:
         node_id = self._birth()
         covariance = covariance + COVARIANCE_FLOOR
         self.graph.add_edge(Edge(0, previous_id, node_id, T_previous_new, covariance, EdgeType.ODOMETRY))
+        self._take_places()
         self.local.settle(node_id)
         self._anchor_beside(node_id)
         grid = self._require().grid
         for edge in self._neighbours.edges_for(node_id, self.graph, self.local, grid):
             self.graph.add_edge(edge)
-        self._take_places()
         if self._recogniser is not None:
             self._recogniser.at_node(self, born=True)
 
@@ -302,7 +303,7 @@ class TopoMapper:
     def _take_places(self) -> None:
         now = self._require()
         slam = now.slam
-        taken = self.keeper.take_ripe(self.local.standings, slam.T_grid_base, now.grid, slam.stamp_s)
+        taken = self.keeper.take_ripe(self.local, slam.T_grid_base, now.grid, slam.stamp_s)
         self._tell(taken)
 
     def _tell(self, taken: list[Taken]) -> None:
