@@ -50,7 +50,7 @@ class NeighbourFinder:
         return sorted(found, key=lambda candidate: (candidate[1], candidate[0]))
 
     def _is_sure(self, standing: Standing) -> bool:
-        """Tell whether a node stands in the window by measurement, or is predicted well enough for a route."""
+        """Tell whether a node stands in the window by measurement, or is predicted well enough."""
         variance = float(np.linalg.eigvalsh(standing.covariance[:2, :2])[-1])
         return standing.anchored or variance <= self._config.near_neighbour_sigma_m**2
 
