@@ -170,10 +170,11 @@ class Legs:
         self._route_meter, self._cycle_meter = meters
         self._leg: Leg | None = None
         self._begun = (0.0, 0.0, 0)
-        self._cycle = 0
+        self._cycle = self._goal_id = 0
 
-    def begin(self, now_s: float, cycle: int) -> None:
+    def begin(self, now_s: float, cycle: int, goal_id: int) -> None:
         """Start to write down a leg."""
+        self._goal_id = goal_id
         truth = self._simulator.truth()
         self._leg = Leg(self._kind, self._seed, len(self.done))
         self._begun = (now_s, truth.path_m, truth.contact_count)
@@ -196,7 +197,10 @@ class Legs:
         leg.planner_cpu_s = self._cycle_meter.total_s
         leg.stops = stops(leg.v_mps)
         self.done.append(leg)
-        self.ends.append((float(truth.T_world_base[0]), float(truth.T_world_base[1])))
+        goal_id = self._goal_id if self._goal_id in moment.view.T_grid_node else moment.view.associated_id
+        T_base_goal = se2.between(moment.view.T_grid_base, moment.view.T_grid_node[goal_id])
+        T_world_goal = se2.compose(truth.T_world_base, T_base_goal)
+        self.ends.append((float(T_world_goal[0]), float(T_world_goal[1])))
         self._leg = None
         return True
 
@@ -236,7 +240,7 @@ class TopoTour:
             return Order(MissionState.FAILED, "no such node")
         if self._goals:  # `far` is the same place each time
             self._goals = [str(node_id) if goal == "far" else goal for goal in self._goals]
-        self._legs.begin(moment.now_s, moment.output.cycle)
+        self._legs.begin(moment.now_s, moment.output.cycle, node_id)
         return Order(MissionState.RUNNING, "leg", Goal(node_id))
 
 
@@ -245,19 +249,18 @@ class MetricTour:
 
     def __init__(self, legs: Legs, planner: WholeGridPlanner, points: Sequence[tuple[float, float]]) -> None:
         self._legs, self._planner, self._points = legs, planner, list(points)
+        self._begun = False
 
     def step(self, moment: Moment) -> Order:
         """Return what to do now."""
-        if self._legs.done and not self._points and not moment.navigator.goal:
-            return Order(MissionState.DONE)
-        if moment.navigator.goal is not None and not self._legs.watch(moment):
+        over = self._legs.watch(moment)
+        if self._begun and not over:
             return Order(MissionState.RUNNING)
-        if moment.output.cycle > 1 and moment.navigator.goal is None:
-            self._legs.watch(moment)
+        self._begun = True
         if not self._points:
             return Order(MissionState.DONE)
         self._planner.set_goal(self._points.pop(0))
-        self._legs.begin(moment.now_s, moment.output.cycle)
+        self._legs.begin(moment.now_s, moment.output.cycle, GOAL_ID)
         self._planner.renew(moment.view.T_grid_base, moment.now_s)
         return Order(MissionState.RUNNING, "leg", Goal(GOAL_ID))
 
@@ -352,6 +355,8 @@ def bench_tasks(name: str, seeds: int, out: Path) -> None:
 
 def report(legs: Sequence[Leg]) -> None:
     print("                legs reached   time s   way m 1st plan ms planner CPU s stops contacts")
+    for leg in legs:
+        print(f"  {leg.kind} {leg.seed}.{leg.number} {leg.state} {leg.time_s:.1f} s {leg.path_m:.2f} m")
     means = {}
     for kind in ("topological", "metric"):
         mine = [leg for leg in legs if leg.kind == kind]
