@@ -30,6 +30,7 @@ SLAMS: dict[str, Callable[[SlamConfig, int], GridSlam]] = {
 }
 BASELINE_PARTICLES = 30  # growing grid: what Grisetti et al. 2007 used on these logs
 BAR_PERIOD_S = 0.2
+PROFILE_ROWS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,8 @@ class _Drive:
     stamps_s: list[float] = field(default_factory=list)
     walls: WallSketch = field(default_factory=WallSketch)
     updates: int = 0
+    profile: list[tuple[float, float, float, float]] = field(default_factory=list)
+    """Now and then: share of the log done, CPU of grid and topology so far (s), memory (MB)."""
     grid_cpu_s: float = 0.0
     topo_cpu_s: float = 0.0
 
@@ -117,6 +120,7 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
             "cpu_by_part_s": {"read": read_cpu_s, "grid": drive.grid_cpu_s, "topo": drive.topo_cpu_s},
             "realtime_factor": summary["log_s"] / (time.perf_counter() - begun_s),
             "peak_rss_mb": outputs.peak_rss_mb(),
+            "profile": drive.profile,
         }
         outputs.write_summary(stage / "summary.json", summary)
     return (
@@ -129,6 +133,7 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
 def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
     """Feed every scan to the mapper, in file order."""
     drive = _Drive()
+    stride = max(1, len(log) // PROFILE_ROWS)
     shown_s, begun_s, begun_cpu_s = -math.inf, time.perf_counter(), time.process_time()
     for index, (odometry, scan) in enumerate(log):
         update = mapper.update(scan, odometry)
@@ -140,6 +145,9 @@ def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
         if now_s - shown_s > BAR_PERIOD_S:
             shown_s = now_s
             bar.show(index / len(log), index, (scan.stamp_s - drive.stamps_s[0]) / (now_s - begun_s))
+        if index % stride == 0:
+            topo_cpu_s = time.process_time() - begun_cpu_s - slam.cpu_s
+            drive.profile.append((index / len(log), slam.cpu_s, topo_cpu_s, outputs.rss_mb()))
     bar.show(1.0, len(log))
     drive.grid_cpu_s = slam.cpu_s
     drive.topo_cpu_s = time.process_time() - begun_cpu_s - slam.cpu_s
