@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 
 from lemtomap.topo import schema
-from lemtomap.topo.graph import USUAL_SPEED_MPS
-from lemtomap.topo.rows import planar_length_m
+from lemtomap.topo.graph import USUAL_SPEED_MPS, Mark, Placeholder
+from lemtomap.topo.rows import placeholder_from, planar_length_m
 from lemtomap.types import EdgeTable, RouteEdge
 
 _NEIGHBOURS = (
@@ -110,6 +110,17 @@ class TopoReader:
                 return None
             rows = self._db.execute("SELECT DISTINCT node FROM change WHERE version > ?", (version,))
             return [int(node_id) for (node_id,) in rows]
+
+    def openings(self) -> list[Placeholder]:
+        """Return the openings towards unexplored space, explored and closed ones too."""
+        with schema.guarded(self.path):
+            rows = self._db.execute("SELECT id, node, x, y, yaw, width, state FROM placeholder ORDER BY id")
+            return [placeholder_from(row) for row in rows]
+
+    def marks(self) -> list[Mark]:
+        """Return everything that was felt rather than seen."""
+        with schema.guarded(self.path):
+            return [Mark(*row) for row in self._db.execute("SELECT id, node, kind, x, y, stamp FROM mark")]
 
     def node_of(self, name: str) -> int | None:
         """Return the node that bears this name."""
