@@ -15,7 +15,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.solve import Problem, solve_local
-from lemtomap.types import GridView
+from lemtomap.types import EdgeType, GridView
 
 EDGE_MARGIN_M = 1.0  # a node nearer to the window's border than this has lost its surroundings
 
@@ -145,3 +145,27 @@ class LocalMap:
             for edge in self._graph.edges_of(node_id)
             if edge.source_id == node_id and edge.target_id in settled
         ]
+
+
+class EdgePicture:
+    """The edges among the nodes that stand nearby, for pictures; found again only when the map changed."""
+
+    def __init__(self, graph: PagedGraph, local: LocalMap) -> None:
+        self._graph = graph
+        self._local = local
+        self._key = (-1, -1)
+        self._edges: list[tuple[int, int, int, EdgeType]] = []
+
+    def edges(self, associated_id: int) -> list[tuple[int, int, int, EdgeType]]:
+        """Return (edge ID, source, target, type)."""
+        key = (self._graph.store.version, associated_id)
+        if self._key != key:
+            self._key = key
+            standings = self._local.standings
+            self._edges = [
+                (edge.edge_id, edge.source_id, edge.target_id, edge.type)
+                for node_id in standings
+                for edge in self._graph.edges_of(node_id)
+                if edge.source_id == node_id and edge.target_id in standings
+            ]
+        return self._edges
