@@ -147,11 +147,11 @@ class Compatibility(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BaseInfo:
-    """Who the robot is; comes once all three are known, or when the firmware did not tell the others."""
+    """Who the robot is; comes once all three are known, and when one changes."""
 
-    hardware: Version | None
+    hardware: Version
     firmware: Version
-    udid: Udid | None
+    udid: Udid
     compatibility: Compatibility
     advice: str
     """One line for the user; empty when all is well."""

@@ -30,10 +30,10 @@ class SlamConfig:
     evidence_miss: int = 2
     evidence_floor: int = -12
     evidence_ceiling: int = 12
-    hits_averaged: int = 8
+    hits_averaged: int = 40
 
     # match: point to line against averaged hits
-    match_sigma_m: float = 0.06  # reach of the robust weight
+    match_sigma_m: float = 0.05  # reach of the robust weight
     match_noise_m: float = 0.04  # of one beam, widened because beams err together
     point_weight: float = 0.8  # of a hit that lies on no plane, against one that does
     degenerate_below: float = 0.18  # diversity (Appendix D) under which the weak axis follows odometry
@@ -41,6 +41,11 @@ class SlamConfig:
     min_quality: float = 0.25  # a worse match is refused
     climb_below: float = 0.75  # quality under which the hill climb is tried too
     large_turn_rad: float = 0.3  # odometry that turns more between two scans is searched all round
+    search_rad: float = 1.6  # how far round: the worst of the logs turns 85 degrees between two scans
+    search_m: float = 0.3
+    collapse_share: float = 0.7  # of the usual quality; below it the wheels are taken to have slipped: search
+    quality_memory: float = 0.05  # share of the newest match in the usual quality
+    rival_gain: float = 0.15  # a pose far from odometry must be so much better
 
     # odometry since the previous match: floor plus share of the motion; tight in translation, loose in
     # rotation
@@ -56,7 +61,7 @@ class SlamConfig:
     renew_rad: float = 2.0
 
     # particles
-    sample_share: float = 0.5  # of the proposal's standard deviation that is sampled
+    sample_share: float = 0.3  # of the proposal's standard deviation that is sampled
     weight_per_quality: float = 200.0  # log weight for the whole step from quality 0 to 1
     dethrone_ratio: float = 20.0  # another particle becomes the best only when it weighs this many times more
     resample_below: float = 0.5  # effective particles as a share of all

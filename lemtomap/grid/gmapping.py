@@ -46,6 +46,11 @@ class RollingGmapping(Tracker):
         since = between(self._particles[self._best].T_grid_base, self._T_grid_base)
         return np.stack([compose(particle.T_grid_base, since) for particle in self._particles])
 
+    @property
+    def nbytes(self) -> int:
+        """Return the memory of all windows."""
+        return sum(window.nbytes for window in self._windows)
+
     def _new_window(self) -> Window:
         return Window(self.config, self._tables, self._scratch)
 

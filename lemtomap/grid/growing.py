@@ -19,7 +19,7 @@ from lemtomap.se2 import Pose
 from lemtomap.types import GridView
 
 TILE = 20  # cells; windows move by whole tiles
-Tile = tuple[NDArray[np.int8], NDArray[np.uint8], NDArray[np.float32], NDArray[np.uint8]]
+Tile = tuple[NDArray[np.int8], NDArray[np.uint8], NDArray[np.uint16], NDArray[np.int8], NDArray[np.uint8]]
 
 
 class ArchivedWindow(Window):
@@ -67,6 +67,7 @@ class ArchivedWindow(Window):
             arrays.evidence[at].copy(),
             arrays.averaged[at].copy(),
             arrays.mean[at].copy(),
+            arrays.lift[at].copy(),
             arrays.normal[at].copy(),
         )
 

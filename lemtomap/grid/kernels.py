@@ -6,8 +6,9 @@ arrays.
 
 evidence  int8 (n, n)        0 never seen, negative free, positive occupied; bounded on both sides
 averaged  uint8 (n, n)       hits in the mean, saturates
-mean      float32 (n, n, 2) averaged hit point from the cell's corner, metres
+mean      uint16 (n, n, 2)  averaged hit point from the cell's corner, 65535 to the far corner
 nearest   uint8 (n, n)       index into `offsets` (sorted by distance) of the nearest occupied cell; 255 none
+lift      int8 (n, n)        from the averaged hit to the plane along its normal, 254 to a cell's side
 normal    uint8 (n, n)       surface normal of an occupied cell, 180 / 255 degrees a step; 255 no plane
 """
 
@@ -21,9 +22,11 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 
 NONE = 255
+WHOLE = 65535.0
+LIFTS = 254.0
 MIN_PLANE_POINTS = 4
 PLANE_RADIUS = 3
-PLANE_RATIO = 0.2
+PLANE_RATIO = 0.1
 
 
 @njit(nogil=True, cache=True)
@@ -133,11 +136,12 @@ def _orphan(
 
 
 @njit(nogil=True, cache=True)
-def _renew_normal(
-    evidence: Array, mean: Array, normal: Array, n: int, origin: Array, resolution: float, gx: int, gy: int
-) -> None:
+def _renew_normal(window: Any, gx: int, gy: int) -> None:
     """Fit a plane through the averaged hit points around an occupied cell."""
-    k = 0
+    evidence, mean, normal, origin = window.evidence, window.mean, window.normal, window.origin
+    n = evidence.shape[0]
+    cells = 0
+    k = 0.0
     sx = sy = sxx = sxy = syy = 0.0
     for dy in range(-PLANE_RADIUS, PLANE_RADIUS + 1):
         cy = gy + dy
@@ -150,16 +154,18 @@ def _renew_normal(
                 continue
             col = cx % n
             if evidence[row, col] > 0:
-                x = dx * resolution + mean[row, col, 0]
-                y = dy * resolution + mean[row, col, 1]
-                k += 1
-                sx += x
-                sy += y
-                sxx += x * x
-                sxy += x * y
-                syy += y * y
+                x = dx + mean[row, col, 0] / WHOLE
+                y = dy + mean[row, col, 1] / WHOLE
+                w = float(window.averaged[row, col])
+                cells += 1
+                k += w
+                sx += w * x
+                sy += w * y
+                sxx += w * x * x
+                sxy += w * x * y
+                syy += w * y * y
     normal[gy % n, gx % n] = NONE
-    if k < MIN_PLANE_POINTS:
+    if cells < MIN_PLANE_POINTS:
         return
     sxx = sxx / k - sx / k * sx / k
     sxy = sxy / k - sx / k * sy / k
@@ -171,7 +177,11 @@ def _renew_normal(
         return
     along = 0.5 * math.atan2(sxy, half)
     angle = (along + 0.5 * math.pi) % math.pi
-    normal[gy % n, gx % n] = int(angle * 255.0 / math.pi + 0.5) % 255
+    row, col = gy % n, gx % n
+    normal[row, col] = int(angle * 255.0 / math.pi + 0.5) % 255
+    off = (sx / k - mean[row, col, 0] / WHOLE) * math.cos(angle)
+    off += (sy / k - mean[row, col, 1] / WHOLE) * math.sin(angle)
+    window.lift[row, col] = int(min(max(round(off * LIFTS), -127), 127))
 
 
 @njit(nogil=True, cache=True)
@@ -180,8 +190,9 @@ def _average_hit(averaged: Array, mean: Array, row: int, col: int, x: float, y: 
     if k < bound:
         k += 1
         averaged[row, col] = k
-    mean[row, col, 0] += (x - mean[row, col, 0]) / k
-    mean[row, col, 1] += (y - mean[row, col, 1]) / k
+    before_x, before_y = float(mean[row, col, 0]), float(mean[row, col, 1])
+    mean[row, col, 0] = round(before_x + (x * WHOLE - before_x) / k)
+    mean[row, col, 1] = round(before_y + (y * WHOLE - before_y) / k)
 
 
 @njit(nogil=True, cache=True)
@@ -259,7 +270,7 @@ def integrate(
     (3, many, 2).
     """
     evidence, averaged, mean = window.evidence, window.averaged, window.mean
-    nearest, normal, origin = window.nearest, window.normal, window.origin
+    nearest, origin = window.nearest, window.origin
     n = evidence.shape[0]
     hit, miss, floor, ceiling, bound = rules[0], rules[1], rules[2], rules[3], rules[4]
     c, s = math.cos(T_grid_base[2]), math.sin(T_grid_base[2])
@@ -285,7 +296,7 @@ def integrate(
                 averaged[row, col] = 0
                 if after > 0:
                     _spread_new(nearest, offsets, n, origin, gx, gy)
-        _average_hit(averaged, mean, row, col, x - gx * resolution, y - gy * resolution, bound)
+        _average_hit(averaged, mean, row, col, x / resolution - gx, y / resolution - gy, bound)
     ray = np.empty(4)
     ray[0] = T_grid_base[0] + c * laser[0] - s * laser[1]
     ray[1] = T_grid_base[1] + s * laser[0] + c * laser[1]
@@ -306,7 +317,7 @@ def integrate(
     for i in range(touched_count):
         gx, gy = touched[i, 0], touched[i, 1]
         if evidence[gy % n, gx % n] > 0:
-            _renew_normal(evidence, mean, normal, n, origin, resolution, gx, gy)
+            _renew_normal(window, gx, gy)
 
 
 @njit(nogil=True, cache=True)
@@ -407,8 +418,8 @@ def occupied_points(evidence: Array, mean: Array, origin: Array, resolution: flo
         for gx in range(origin[0], origin[0] + n):
             col = gx % n
             if evidence[row, col] > 0 and k < out.shape[0]:
-                out[k, 0] = gx * resolution + mean[row, col, 0]
-                out[k, 1] = gy * resolution + mean[row, col, 1]
+                out[k, 0] = (gx + mean[row, col, 0] / WHOLE) * resolution
+                out[k, 1] = (gy + mean[row, col, 1] / WHOLE) * resolution
                 k += 1
     return k
 
@@ -422,6 +433,7 @@ def paste(
     evidence: Array,
     averaged: Array,
     mean: Array,
+    lift: Array,
     normal: Array,
 ) -> None:
     """Put a remembered square of cells, least corner at (gx, gy), into unknown cells; the look-up learns
@@ -436,6 +448,7 @@ def paste(
             window.averaged[row, col] = averaged[dy, dx]
             window.mean[row, col, 0] = mean[dy, dx, 0]
             window.mean[row, col, 1] = mean[dy, dx, 1]
+            window.lift[row, col] = lift[dy, dx]
             window.normal[row, col] = normal[dy, dx]
             if evidence[dy, dx] > 0:
                 _spread_new(window.nearest, offsets, n, window.origin, gx + dx, gy + dy)

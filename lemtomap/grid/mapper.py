@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.matching import Match, Matcher
 from lemtomap.grid.matching import kernels as matching_kernels
-from lemtomap.grid.motion import between, compose, odometry_uncertainty
+from lemtomap.grid.motion import Uncertainty, between, compose, odometry_uncertainty
 from lemtomap.grid.publish import SmoothCorrection
 from lemtomap.grid.scan import Beams, ScanPreparer
 from lemtomap.grid.window import Scratch, Window, look_up
@@ -64,6 +64,7 @@ class Tracker(ABC):
         self._integrated_s = -math.inf
         self._diversity = 0.0
         self._quality = 0.0
+        self._usual_quality = 0.0
         self._covariance = self._information = np.zeros((3, 3))
         self._reported: Pose | None = None
         self._rates = np.array(
@@ -155,9 +156,20 @@ class Tracker(ABC):
         )
 
     def _track(self, beams: Beams, predicted: Pose, turn_rad: float) -> Match:
-        uncertainty = odometry_uncertainty(self._pending, self.config)
-        reach_rad = 1.6 if turn_rad > self.config.large_turn_rad else 0.0
-        return self._match(beams, predicted, uncertainty, self._window(), reach_rad)
+        """Match against the best window; look all round where odometry leapt or the scan suddenly fits
+        nowhere.
+        """
+        config, window = self.config, self._window()
+        uncertainty = odometry_uncertainty(self._pending, config)
+        leapt = turn_rad > config.large_turn_rad
+        match = self._match(beams, predicted, uncertainty, window, config.search_rad if leapt else 0.0)
+        if match.quality < config.collapse_share * self._usual_quality and not leapt:
+            slipped = Uncertainty(config.search_m, config.search_rad)
+            rival = self._match(beams, predicted, slipped, window, config.search_rad)
+            if rival.quality > match.quality + config.rival_gain:
+                match = rival
+        self._usual_quality += config.quality_memory * (match.quality - self._usual_quality)
+        return match
 
     def _step_covariance(self, T_grid_base: Pose) -> NDArray[np.float64]:
         """Return how far the motion since the previous report may be wrong.

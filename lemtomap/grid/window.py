@@ -22,7 +22,8 @@ class WindowArrays(NamedTuple):
 
     evidence: NDArray[np.int8]
     averaged: NDArray[np.uint8]
-    mean: NDArray[np.float32]
+    mean: NDArray[np.uint16]
+    lift: NDArray[np.int8]
     nearest: NDArray[np.uint8]
     normal: NDArray[np.uint8]
     origin: NDArray[np.int64]
@@ -71,7 +72,8 @@ class Window:
         self.arrays = WindowArrays(
             evidence=np.zeros((n, n), dtype=np.int8),
             averaged=np.zeros((n, n), dtype=np.uint8),
-            mean=np.zeros((n, n, 2), dtype=np.float32),
+            mean=np.zeros((n, n, 2), dtype=np.uint16),
+            lift=np.zeros((n, n), dtype=np.int8),
             nearest=np.full((n, n), kernels.NONE, dtype=np.uint8),
             normal=np.full((n, n), kernels.NONE, dtype=np.uint8),
             origin=np.array([-(n // 2), -(n // 2)], dtype=np.int64),

@@ -17,7 +17,6 @@ NEWTON_ROUNDS = 12
 CLIMB_STEP_M, CLIMB_STEP_RAD, CLIMB_ROUNDS = 0.08, 0.04, 3
 CLIMB_TRUST = 0.002  # score given up per unit of squared Mahalanobis distance from odometry
 SWEEP_STEP_M, SWEEP_STEP_RAD = 0.1, 0.05
-SWEEP_REACH_M = 0.3
 
 
 class Rules(NamedTuple):
@@ -57,6 +56,7 @@ class Matcher:
 
     def __init__(self, config: SlamConfig, tables: LookUp) -> None:
         self._min_points, self._min_quality = config.min_points, config.min_quality
+        self._reach_m = config.search_m
         self._tables = tables
         self._rules = Rules(
             config.resolution_m,
@@ -96,7 +96,7 @@ class Matcher:
             self._tables,
             self._rules,
             reach_rad,
-            SWEEP_REACH_M if reach_rad > 0.0 else 0.0,
+            self._reach_m if reach_rad > 0.0 else 0.0,
             out,
         )
         quality, diversity = out[21:].tolist()

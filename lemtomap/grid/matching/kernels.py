@@ -16,6 +16,8 @@ Array = NDArray[Any]
 Pair = tuple[float, float]
 
 NONE = 255
+WHOLE = 65535.0
+LIFTS = 254.0
 
 
 @njit(nogil=True, cache=True)
@@ -36,7 +38,7 @@ def _linearise(
     corner_x, corner_y = origin[0] * resolution, origin[1] * resolution
     ring_x, ring_y = origin[0] % n, origin[1] % n
     base_x, base_y = pose[0] - corner_x, pose[1] - corner_y
-    per_metre = 1.0 / resolution
+    per_metre, per_whole, per_lift = 1.0 / resolution, resolution / WHOLE, resolution / LIFTS
     scale = -0.5 / (sigma * sigma)
     hxx = hxy = hyy = hxt = hyt = htt = bx = by = bt = 0.0
     for i in range(points.shape[0]):
@@ -68,13 +70,16 @@ def _linearise(
             at_row -= n
         elif at_row < 0:
             at_row += n
-        ex = (col + dx) * resolution + mean[at_row, at_col, 0] - x
-        ey = (row + dy) * resolution + mean[at_row, at_col, 1] - y
+        ex = (col + dx) * resolution + mean[at_row, at_col, 0] * per_whole - x
+        ey = (row + dy) * resolution + mean[at_row, at_col, 1] * per_whole - y
         k = normal[at_row, at_col]
         w = math.exp(scale * (ex * ex + ey * ey))
         total += w
         if k != NONE:
             nx, ny = normals[k, 0], normals[k, 1]
+            off = window.lift[at_row, at_col] * per_lift
+            ex += off * nx
+            ey += off * ny
             wxx, wxy, wyy = w * nx * nx, w * nx * ny, w * ny * ny
         else:
             wxx = wyy = point_weight * w
