@@ -31,6 +31,10 @@ class ClockConfig:
     """A packet later than this shows another epoch; anything less can be a host that slept."""
     strikes: int = 3
     """So many packets of another epoch in a row, consistent with one another, start it."""
+    step_s: float = 0.05
+    """Two bins in a row later than this: the device's clock stood still for a while; what came before is
+    void.
+    """
     learn_s: float = 3.0
     """After `anchor`, the constant latency of the stream is learnt for this long."""
 
@@ -59,6 +63,7 @@ class DeviceClock:
         self._bins: deque[tuple[float, float]] = deque(maxlen=self._config.window_bins)
         self._bin: list[tuple[float, float]] = []
         self._bin_end_s = float("-inf")
+        self._late_bins = 0
         self._stamp: tuple[float, float] | None = None
         self._strike_count = 0
         self._strike: tuple[int, float] = (0, 0.0)
@@ -147,10 +152,17 @@ class DeviceClock:
         self._bin.append((delay_s, device_s))
         if arrival_s >= self._bin_end_s:
             delay_s, device_s = min(self._bin)
+            self._late_bins = self._late_bins + 1 if self._stepped(delay_s - self._line(device_s)) else 0
+            if self._late_bins > 1:
+                self._bins = deque([self._bins[-1]], maxlen=self._bins.maxlen)
+                self._late_bins = 0
             self._bins.append((device_s, delay_s))
             self._bin = []
             self._bin_end_s = arrival_s + self._config.bin_s
             self._close_bin(arrival_s)
+
+    def _stepped(self, late_s: float) -> bool:
+        return self._learn_until_s is None and late_s > self._config.step_s
 
     def _close_bin(self, arrival_s: float) -> None:
         if self._learn_until_s is None:

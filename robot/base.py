@@ -78,6 +78,14 @@ class BaseStep:
                 self._tell(seen, now_s)
         self._match_scans(now_s)
 
+    def lost(self, device: str) -> None:
+        """Take note that a device's port went away: it is silent from now on, not only after its time-out."""
+        if device == "kobuki":
+            self._sample = None
+        else:
+            self._scan = None
+            self._waiting.clear()
+
     def teleop(self, twist: Twist, now_s: float) -> None:
         """Take a person's wish; repeat it at least twice a second."""
         self._mux.offer(TELEOP, twist, now_s)

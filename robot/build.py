@@ -9,6 +9,7 @@ from lemtomap.grid.gmapping import RollingGmapping
 from lemtomap.grid.growing import GrowingGmapping
 from lemtomap.grid.mapper import WindowMatcher
 from lemtomap.nav.navigator import Navigator
+from lemtomap.topo.loops.recogniser import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
@@ -40,7 +41,8 @@ def build_core(
     """Return a robot that maps into `map_path`, a new file or an existing map. Raises BadMap, BadSetting."""
     exchange = Exchange()
     make = TopoStore.open if map_path.exists() else TopoStore.create
-    mapper = TopoMapper(config.topo, make(map_path, durable=durable))
+    store = make(map_path, durable=durable)
+    mapper = TopoMapper(config.topo, store, recogniser=LoopRecogniser())
     mapping = MappingStep(build_slam(slam, config, seed), mapper, exchange)
     navigation = NavigationStep(Navigator(config.nav), exchange, lambda: TopoReader(map_path))
     return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)

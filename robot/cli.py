@@ -13,7 +13,7 @@ import typer
 
 from drivers.errors import DriverError
 from lemtomap.errors import LemtomapError
-from robot import cli_drive, cli_file, cli_map
+from robot import cli_doctor, cli_drive, cli_file, cli_map
 from sim.errors import SimError
 
 DEBUG_VARIABLE = "LEMTOMAP_DEBUG"  # set: show the traceback of an unexpected error
@@ -41,6 +41,7 @@ def _program() -> None:
 
 
 cli_drive.register(app)
+cli_doctor.register(app)
 cli_map.register(app)
 cli_file.register(app)
 

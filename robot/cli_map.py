@@ -27,6 +27,17 @@ def register(app: typer.Typer) -> None:
         "lemtomap map aces.clf --out out/aces --slam gmapping --particles 30    the baseline: no forgetting",
         name="map",
     )
+    app.command(
+        "bench",
+        help="\b\n"
+        "lemtomap bench                                     what can be measured\n"
+        "lemtomap bench thesis --quick                      chapter 5 of the thesis, as a report\n"
+        "lemtomap bench logs intel.clf.xz aces.clf.xz       every metric layer on recorded logs\n"
+        "lemtomap bench topo scale                          a map of a million nodes\n\n"
+        "Measure; everything after the name goes to that bench (--help too).",
+        short_help="Measure.",
+        context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []},
+    )(bench)
 
 
 def map_(
@@ -56,3 +67,17 @@ def map_(
     with progress_bar(f"mapping {log.name}") as bar:
         told = map_log(options, bar)
     typer.echo(told)
+
+
+def bench(
+    context: typer.Context,
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="which bench; none: list them")] = None,
+) -> None:
+    """Measure."""
+    from robot.bench import benches, run_bench
+
+    if name is None or name == "--help":
+        typer.echo(context.get_help() + "\n")
+        typer.echo("\n".join(f"  {known:<10} {about}" for known, about in sorted(benches().items())))
+        return
+    raise typer.Exit(run_bench(name, context.args))

@@ -26,6 +26,8 @@ class Samples:
 
     base: Sequence[KobukiEvent] = ()
     laser: Sequence[HokuyoEvent] = ()
+    lost: Sequence[str] = ()
+    """Devices whose port went away ("kobuki", "hokuyo"): what they told last is no evidence any more."""
 
 
 @dataclass(slots=True)
@@ -70,7 +72,12 @@ class RobotCore:
 
     def take(self, samples: Samples, now_s: float) -> None:
         """Base: take what the devices told."""
-        _timed(self.efforts.base, lambda: self.base.take(samples.base, samples.laser, now_s))
+        _timed(self.efforts.base, lambda: self._take(samples, now_s))
+
+    def _take(self, samples: Samples, now_s: float) -> None:
+        for device in samples.lost:
+            self.base.lost(device)
+        self.base.take(samples.base, samples.laser, now_s)
 
     def command(self, now_s: float) -> Commands:
         """Base: return what to send now."""

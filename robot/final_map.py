@@ -9,9 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, compose, inverse
+from lemtomap.se2 import Pose, between, compose, inverse
 from lemtomap.topo.layout import lay_out, trajectory
 from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.smooth import smooth
+from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 
 
@@ -39,16 +41,43 @@ class FinalMap:
         return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
-def final_map(mapper: TopoMapper) -> FinalMap:
-    """Place everything the mapper knows; needs at least one scan."""
-    layout = lay_out(mapper.store)
-    stamps_s, T_map_base = trajectory(layout, mapper.trail)
+def final_map(mapper: TopoMapper, *, whole_drive: bool = True) -> FinalMap:
+    """Place everything the mapper knows; needs at least one scan.
+
+    `whole_drive`: the map began empty with this drive, so that every scan may be fitted, not only every node.
+    """
     view = mapper.view()
+    if whole_drive:
+        smoothed = smooth(mapper.store, mapper.trail)
+        stamps_s, T_map_base = smoothed.stamps_s, smoothed.T_map_base
+        T_map_node = _with_the_rest(mapper.store, smoothed.T_map_node)
+    else:
+        layout = lay_out(mapper.store)
+        T_map_node = layout.T_map_node
+        stamps_s, T_map_base = trajectory(layout, mapper.trail)
     here = view.associated_id
     return FinalMap(
-        T_map_node=layout.T_map_node,
+        T_map_node=T_map_node,
         edges=[(edge.source_id, edge.target_id, edge.type) for edge in mapper.store.edges()],
         stamps_s=stamps_s,
         T_map_base=T_map_base,
-        T_map_grid=compose(layout.T_map_node[here], inverse(view.T_grid_node[here])),
+        T_map_grid=compose(T_map_node[here], inverse(view.T_grid_node[here])),
     )
+
+
+def _with_the_rest(store: TopoStore, placed: Mapping[int, Pose]) -> dict[int, Pose]:
+    """Return all nodes of the store: those no scan belongs to follow from the edges."""
+    everything = dict(placed)
+    ids = [node.node_id for node in store.nodes()]
+    if all(node_id in placed for node_id in ids):
+        return everything
+    layout = lay_out(store)
+    anchors = {layout.component[node_id]: node_id for node_id in placed if node_id in layout.component}
+    for node_id in ids:
+        anchor = anchors.get(layout.component[node_id])
+        if node_id not in placed and anchor is not None:
+            T_anchor_node = between(layout.T_map_node[anchor], layout.T_map_node[node_id])
+            everything[node_id] = compose(placed[anchor], T_anchor_node)
+        elif node_id not in placed:
+            everything[node_id] = layout.T_map_node[node_id]
+    return everything

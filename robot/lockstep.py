@@ -39,7 +39,8 @@ def run_lockstep(
             now_ns += PERIOD_NS
             now_s = now_ns * 1e-9
             simulator.advance(now_s)
-            commands = core.step(Samples(base.poll(now_s), laser.poll(now_s)), now_s)
+            told = base.poll(now_s), laser.poll(now_s)
+            commands = core.step(Samples(*told, base.lost + laser.lost), now_s)
             base.write(base_session.drive(commands.drive.v_mps, commands.drive.w_radps), now_s)
             for signal in commands.signals:
                 base.write(signal_bytes(base_session, signal), now_s)

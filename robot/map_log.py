@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lemtomap.grid import GridSlam, GrowingGmapping, RollingGmapping, SlamConfig, WindowMatcher
 from lemtomap.pipeline import Mapper
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.loops.recogniser import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType, GridView, MapView, Odometry, Scan, SlamUpdate
@@ -29,6 +30,7 @@ SLAMS: dict[str, Callable[[SlamConfig, int], GridSlam]] = {
 }
 BASELINE_PARTICLES = 30  # growing grid: what Grisetti et al. 2007 used on these logs
 BAR_PERIOD_S = 0.2
+PROFILE_ROWS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +60,8 @@ class _Drive:
     stamps_s: list[float] = field(default_factory=list)
     walls: WallSketch = field(default_factory=WallSketch)
     updates: int = 0
+    profile: list[tuple[float, float, float, float]] = field(default_factory=list)
+    """Now and then: share of the log done, CPU of grid and topology so far (s), memory (MB)."""
     grid_cpu_s: float = 0.0
     topo_cpu_s: float = 0.0
 
@@ -98,7 +102,8 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
     read_cpu_s = time.process_time() - begun_cpu_s
     with outputs.staged(options.out) as stage:
         slam = _Timed(SLAMS[options.slam](config, options.seed))
-        topo = TopoMapper(TopoConfig(), TopoStore.create(stage / "map.lemto", durable=False))
+        store = TopoStore.create(stage / "map.lemto", durable=False)
+        topo = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
         try:
             drive = _drive(log, Mapper(slam, topo), slam, bar)
             final, view = final_map(topo), topo.view()
@@ -115,6 +120,7 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
             "cpu_by_part_s": {"read": read_cpu_s, "grid": drive.grid_cpu_s, "topo": drive.topo_cpu_s},
             "realtime_factor": summary["log_s"] / (time.perf_counter() - begun_s),
             "peak_rss_mb": outputs.peak_rss_mb(),
+            "profile": drive.profile,
         }
         outputs.write_summary(stage / "summary.json", summary)
     return (
@@ -127,6 +133,7 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
 def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
     """Feed every scan to the mapper, in file order."""
     drive = _Drive()
+    stride = max(1, len(log) // PROFILE_ROWS)
     shown_s, begun_s, begun_cpu_s = -math.inf, time.perf_counter(), time.process_time()
     for index, (odometry, scan) in enumerate(log):
         update = mapper.update(scan, odometry)
@@ -138,6 +145,9 @@ def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
         if now_s - shown_s > BAR_PERIOD_S:
             shown_s = now_s
             bar.show(index / len(log), index, (scan.stamp_s - drive.stamps_s[0]) / (now_s - begun_s))
+        if index % stride == 0:
+            topo_cpu_s = time.process_time() - begun_cpu_s - slam.cpu_s
+            drive.profile.append((index / len(log), slam.cpu_s, topo_cpu_s, outputs.rss_mb()))
     bar.show(1.0, len(log))
     drive.grid_cpu_s = slam.cpu_s
     drive.topo_cpu_s = time.process_time() - begun_cpu_s - slam.cpu_s

@@ -15,6 +15,7 @@ from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent
 from lemtomap.types import MapView, RouteGraph
 from robot.exchange import MissionState
+from robot.ways import farthest_node, ways_from
 
 
 class NamedGraph(RouteGraph, Protocol):
@@ -35,6 +36,8 @@ class Moment:
     output: NavOutput
     navigator: Navigator
     T_odom_base: Pose
+    start_id: int = 1
+    """The node at which this run began."""
     docking: DockingOutput | None = None
     """How the drive onto the dock stands, once it has begun."""
 
@@ -135,6 +138,56 @@ class Explore:
         return Order(state, found.text, found.goal, cancel=found.done, events=found.events)
 
 
+class Tour:
+    """Pass within a few metres of every node that can be reached, nearest first, and come back.
+
+    On a map of a single node there is nothing to visit: explore first (`explore,tour`).
+    """
+
+    def __init__(self, spacing_m: float = 3.0) -> None:
+        self._spacing_m = spacing_m
+        self._seen: set[int] = set()
+        self._here = 0
+        self._leg: GoTo | None = None
+        self._target = 0
+        self._missed = 0
+
+    def step(self, moment: Moment) -> Order:
+        """Look around at each node; give the next goal when the last one was reached or given up."""
+        self._look(moment)
+        if self._leg is not None:
+            order = self._leg.step(moment)
+            if not order.state.over:
+                return Order(MissionState.RUNNING, self._text(), order.goal)
+            if order.state is MissionState.FAILED:
+                self._missed += 1
+                self._seen.add(self._target)
+            if self._target == moment.start_id:
+                return Order(MissionState.DONE, f"visited everything; {self._missed} places not reached")
+        self._target = self._next(moment)
+        self._leg = GoTo(str(self._target))
+        return Order(MissionState.RUNNING, self._text(), self._leg.step(moment).goal)
+
+    def _look(self, moment: Moment) -> None:
+        """Tick off what is near."""
+        here = moment.view.associated_id
+        if here == self._here:
+            return
+        self._here = here
+        for way_m, node_id in ways_from(moment.graph, here):
+            if way_m > self._spacing_m:
+                return
+            self._seen.add(node_id)
+
+    def _next(self, moment: Moment) -> int:
+        """Return the nearest node not seen yet; the start when there is none."""
+        ways = ways_from(moment.graph, moment.view.associated_id)
+        return next((node_id for _, node_id in ways if node_id not in self._seen), moment.start_id)
+
+    def _text(self) -> str:
+        return f"touring: to node {self._target}, {self._missed} places not reached"
+
+
 class Series:
     """One mission after another; fails when one of them fails."""
 
@@ -160,28 +213,10 @@ def resolve(place: str, moment: Moment) -> int | None:
     if place == "here":
         return moment.view.associated_id
     if place == "start":
-        return 1 if moment.graph.has_node(1) else None
+        return moment.start_id if moment.graph.has_node(moment.start_id) else None
     if place == "far":
         return farthest_node(moment.graph, moment.view.associated_id)
     return None
-
-
-def farthest_node(graph: RouteGraph, start_id: int, at_most: int = 100_000) -> int:
-    """Return the node whose shortest way over edges from `start_id` is longest (of the first `at_most`)."""
-    import heapq  # noqa: PLC0415
-
-    done: set[int] = set()
-    heap, last = [(0.0, start_id)], start_id
-    while heap and len(done) < at_most:
-        length_m, node_id = heapq.heappop(heap)
-        if node_id in done:
-            continue
-        done.add(node_id)
-        last = node_id
-        for edge in graph.edges_of(node_id):
-            if edge.other_id not in done:
-                heapq.heappush(heap, (length_m + edge.length_m, edge.other_id))
-    return last
 
 
 def parse_mission(text: str) -> Mission:
@@ -196,6 +231,8 @@ def _parse_one(text: str) -> Mission:
         return GoTo(place)
     if text == "explore":
         return Explore()
+    if text == "tour":
+        return Tour()
     if text == "dock":
         return Dock()
     if text == "idle":

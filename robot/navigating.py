@@ -33,7 +33,7 @@ class NavigationStep:
         self._open_graph = open_graph
         self._graph: ClosableGraph | None = None
         self._status = MissionStatus(0.0, MissionState.WAITING)
-        self._failure = ""
+        self._start_id = 1
 
     def step(self, now_s: float) -> None:
         """Run one cycle; does nothing before the first map."""
@@ -41,7 +41,7 @@ class NavigationStep:
         if view is None or odometry is None or view.associated_id == 0:
             return
         if self._graph is None:
-            self._graph = self._open_graph()
+            self._graph, self._start_id = self._open_graph(), view.associated_id
         _ = self._graph.version  # asked once a cycle: here the reader forgets what has changed
         output = self.navigator.step(
             view,
@@ -63,6 +63,7 @@ class NavigationStep:
                 output,
                 self.navigator,
                 odometry.T_odom_base,
+                self._start_id,
                 self._exchange.docking.get(),
             )
         )

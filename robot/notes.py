@@ -53,7 +53,7 @@ def _power(event: kobuki.PowerEvent) -> Described:
 
 
 def _base_info(event: kobuki.BaseInfo) -> Described:
-    text = f"Kobuki, hardware {event.hardware}, firmware {event.firmware}"
+    text = f"Kobuki, hardware {event.hardware or 'unknown'}, firmware {event.firmware}"
     grave = event.compatibility is not kobuki.Compatibility.GOOD
     return BASE, f"{text}; {event.advice}" if event.advice else text, Level.WARN if grave else Level.INFO
 

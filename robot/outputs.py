@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 from numpy.typing import NDArray
 
 from lemtomap.errors import BadSetting
@@ -119,6 +120,11 @@ def peak_rss_mb() -> float:
     """Return the most memory this process has held, in MB (10^6 bytes)."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / 1e6 if sys.platform == "darwin" else peak * 1024 / 1e6
+
+
+def rss_mb() -> float:
+    """Return the memory this process holds now, in MB (10^6 bytes)."""
+    return float(psutil.Process().memory_info().rss) / 1e6
 
 
 def versions() -> dict[str, str]:

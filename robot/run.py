@@ -96,7 +96,9 @@ class Run:
         plan = self.plan
         told = {**plan.facts, "result": ended.state.value, "result_text": ended.text, **self._truth}
         settings = {"seed": plan.seed, "config": {"slam": plan.slam, **to_mapping(plan.config)}}
-        self.summary = self.files.finish(ended.now_s, plan.map_path, told, settings)
+        self.summary = self.files.finish(
+            ended.now_s, plan.map_path, told, settings, whole_drive=self._new_map
+        )
 
     def _take_back(self) -> None:
         """Remove what the start made."""

@@ -80,13 +80,22 @@ class RunFiles(Onlooker):
             self._walls.add(scan.scan.stamp_s, scan.sighting.hits_base)
 
     def finish(
-        self, now_s: float, map_path: Path, told: Mapping[str, Any], settings: Mapping[str, Any]
+        self,
+        now_s: float,
+        map_path: Path,
+        told: Mapping[str, Any],
+        settings: Mapping[str, Any],
+        *,
+        whole_drive: bool,
     ) -> dict[str, Any]:
-        """Close everything, write the results, return the summary, which begins with `told`."""
+        """Close everything, write the results, return the summary, which begins with `told`.
+
+        `whole_drive`: the map began empty with this run.
+        """
         self.look(now_s)
         self.close()
         view = self._core.exchange.map_view.get()
-        final = final_map(self._core.mapping.mapper) if view is not None else None
+        final = final_map(self._core.mapping.mapper, whole_drive=whole_drive) if view is not None else None
         self._core.close()
         summary: dict[str, Any] = {**told, "run_s": now_s}
         if final is not None and view is not None:

@@ -12,6 +12,7 @@ import asyncio
 import contextlib
 import sys
 import threading
+import time
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 
@@ -67,6 +68,9 @@ class Runtime:
         )
         self._base_events: list[KobukiEvent] = []
         self._laser_events: list[HokuyoEvent] = []
+        self._lost: list[str] = []
+        self.loop_cpu_s = 0.0
+        """CPU time of the loop thread: both drivers and the base step."""
         self._cycle_at_s = 0.0
         self._cycle_due = False
         self._crash: BaseException | None = None
@@ -100,6 +104,7 @@ class Runtime:
     # ---- the loop thread ----
 
     async def _loop(self, threads: list[threading.Thread], duration_s: float) -> Ended:
+        begun_s = time.thread_time()
         drivers = [asyncio.create_task(self._kobuki.run()), asyncio.create_task(self._hokuyo.run())]
         output = asyncio.create_task(self._output(duration_s))
         for thread in threads:
@@ -114,6 +119,7 @@ class Runtime:
             for task in (output, *drivers):
                 task.cancel()
             await asyncio.gather(output, *drivers, return_exceptions=True)
+            self.loop_cpu_s = time.thread_time() - begun_s
         self._raise_first(output, *drivers)
         return self._ended()
 
@@ -133,7 +139,11 @@ class Runtime:
             self._port_changed(KOBUKI, event)
             return
         self._base_events.append(event)  # type: ignore[arg-type]
-        if not self._cycle_due:  # after the whole packet was taken, before anything else
+        self._soon()
+
+    def _soon(self) -> None:
+        """Command the base as soon as the whole packet is taken, before anything else."""
+        if not self._cycle_due:
             self._cycle_due = True
             asyncio.get_running_loop().call_soon(self._cycle)
 
@@ -146,8 +156,8 @@ class Runtime:
     def _cycle(self) -> None:
         self._cycle_due = False
         now_s = self._cycle_at_s = self.clock.now_s()
-        samples = Samples(self._base_events, self._laser_events)
-        self._base_events, self._laser_events = [], []
+        samples = Samples(self._base_events, self._laser_events, self._lost)
+        self._base_events, self._laser_events, self._lost = [], [], []
         self.core.take(samples, now_s)
         commands = self.core.command(now_s)
         self._send(self._kobuki.session.drive(commands.drive.v_mps, commands.drive.w_radps), now_s)
@@ -165,6 +175,8 @@ class Runtime:
         opened = isinstance(event, PortOpened)
         self.onlooker.raw.put(Entry(device, Call.PORT, stamp_ns(event.stamp_s), OPENED if opened else LOST))
         if isinstance(event, PortLost):
+            self._lost.append(device)
+            self._soon()
             self.core.exchange.note(event.stamp_s, device, str(event.error), Level.WARN)
 
     def _raise_first(self, *tasks: "asyncio.Task[None]") -> None:

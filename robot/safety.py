@@ -16,7 +16,7 @@ restrictive wins, and the reason names the rule that took something away:
     scan silent       no scan for 0.5 s and motion wanted           stop
     scan blind        (almost) no beam of the scan is valid         stop
     cliff             a cliff sensor sees no floor                  straight back, slowly, only
-    bumper            a bumper is pressed                           no forward, slow back, slow turn
+    bumper            a bumper is pressed                           forward: stop; else slow back, slow turn
     near obstacle     the raw scan has points on the way            slow down, stop before them, may turn away
     limit             faster than the limits                        clamp
 
@@ -207,7 +207,10 @@ class SafetyGate:
         lim = self.limits
         if not (evidence.cliff.any or evidence.bumper.any):
             return allowed
-        v = min(max(allowed.v_mps, -lim.back_off_mps), 0.0)
+        reason = Reason.CLIFF if evidence.cliff.any else Reason.BUMPER
+        if allowed.v_mps > 0.0:
+            return Allowed(0.0, 0.0, reason)
+        v = max(allowed.v_mps, -lim.back_off_mps)
         if evidence.cliff.any:
             return _lessened(allowed, v, 0.0, Reason.CLIFF)
         w = min(max(allowed.w_radps, -lim.bumped_w_max_radps), lim.bumped_w_max_radps)

@@ -92,6 +92,8 @@ class Wire(Generic[E]):
         self.name, self.session = name, session
         self._port, self._record, self._broken = port, record, broken
         self._open = True
+        self.lost: tuple[str, ...] = ()
+        """This device's name when the last poll found its cable out."""
 
     def poll(self, now_s: float) -> list[E]:
         """Read, ask the session what it wants to send, send it; return what the device told."""
@@ -101,8 +103,9 @@ class Wire(Generic[E]):
             if self._open:
                 self._open = False
                 self._record(Entry(self.name, Call.PORT, stamp_ns(now_s), LOST))
-            data = b""
+            data, self.lost = b"", (self.name,)
         else:
+            self.lost = ()
             if not self._open:
                 self._open = True
                 self.session.reopened()

@@ -10,7 +10,7 @@ from sim.errors import BadWorld
 
 LINK_KEYS = frozenset({"lose_byte", "flip_bit", "burst_s", "delay_s", "jitter_s", "unplugged"})
 KEYS: dict[str, tuple[frozenset[str], frozenset[str]]] = {
-    "": (frozenset({"name"}), frozenset({"spawn", "dock", "description", "faults"})),
+    "": (frozenset({"name"}), frozenset({"map", "spawn", "dock", "description", "faults"})),
     "wall": (frozenset({"points"}), frozenset({"surface", "thickness", "height"})),
     "room": (frozenset({"name", "low", "high"}), frozenset({"kind"})),
     "door": (frozenset({"at", "rooms"}), frozenset({"name", "width", "leaf", "period"})),

@@ -1,6 +1,7 @@
 """Worlds described in TOML; an unknown key, an overlapping spawn or a door in no wall is one clear line.
 
 name = "flat"
+map = "plan.yaml"                      # a ROS map to begin with, if wanted
 spawn = [1.0, 1.0, 0.0]
 dock = [0.3, 2.0, 0.0]
 [[wall]]
@@ -45,6 +46,7 @@ from sim.errors import BadWorld
 from sim.faults import Faults, LinkFaults, Window
 from sim.floorplan import FloorPlan
 from sim.movers import Appearing, Person, SwingDoor
+from sim.ros_map import load_ros_map
 from sim.toml_entry import KEYS, Entry
 from sim.world import Box, Pose2, Surface, World
 
@@ -62,6 +64,31 @@ FURNITURE: dict[str, Callable[[float, float, float], list[Box]]] = {
 
 def load_toml(path: Path, *, day: int = 0) -> World:
     """Read a world description. Raises BadWorld with file and line."""
+    top = _read(path)
+    document = top.values
+    entries = {table: _entries(top, table) for table in KEYS if table and "faults" not in table}
+    plan = FloorPlan(f"{path}")
+    spawn = _pose(top, "spawn") if "spawn" in document else None
+    if "map" in document:
+        base = load_ros_map(path.parent / str(document["map"]))
+        for box in base.boxes:
+            plan.box(box)
+        spawn = spawn or base.spawn
+    for table, add in _ADD.items():
+        for entry in entries[table]:
+            add(plan, entry, day)
+    _floors(plan, entries["ramp"], entries["hole"])
+    if "faults" in document:
+        plan.faults = _faults(top)
+    if "dock" in document:
+        plan.dock = _pose(top, "dock")
+    try:
+        return plan.build(spawn, str(document.get("description", path.name)), name=str(document["name"]))
+    except BadWorld as error:
+        raise BadWorld(f"{path}:{top.line('spawn')}: {str(error).removeprefix(f'{path}: ')}") from error
+
+
+def _read(path: Path) -> Entry:
     try:
         text = path.read_text(encoding="utf-8")
         document = tomllib.loads(text)
@@ -71,24 +98,7 @@ def load_toml(path: Path, *, day: int = 0) -> World:
         raise BadWorld(f"{path}: not a readable TOML file ({error})") from error
     top = Entry(path, text, "", 0, document)
     top.check_keys()
-    entries = {table: _entries(top, table) for table in KEYS if table and "faults" not in table}
-    plan = FloorPlan(f"{path}")
-    for table in ("wall", "room", "door"):
-        for entry in entries[table]:
-            _ADD[table](plan, entry, day)
-    for table in ("furniture", "person", "barrier"):
-        for entry in entries[table]:
-            _ADD[table](plan, entry, day)
-    _floors(plan, entries["ramp"], entries["hole"])
-    if "faults" in document:
-        plan.faults = _faults(top)
-    if "dock" in document:
-        plan.dock = _pose(top, "dock")
-    spawn = _pose(top, "spawn") if "spawn" in document else None
-    try:
-        return plan.build(spawn, str(document.get("description", path.name)), name=str(document["name"]))
-    except BadWorld as error:
-        raise BadWorld(f"{path}:{top.line('spawn')}: {str(error).removeprefix(f'{path}: ')}") from error
+    return top
 
 
 def _pose(entry: Entry, key: str) -> Pose2:

@@ -1,6 +1,7 @@
 """The URG-04LX-UG01 on the robot: a mirror that turns while the robot drives, beam after beam."""
 
 import math
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +15,7 @@ from sim.scene import Scene
 from sim.world import Pose2
 
 BEAMS = LAST_STEP - FIRST_STEP + 1
+TRACK = 16  # physics steps remembered: more than one turn
 ANGLES_RAD: NDArray[np.float64] = np.array(
     [(step - FRONT_STEP) * 2 * math.pi / SLITS for step in range(FIRST_STEP, LAST_STEP + 1)]
 )
@@ -44,7 +46,9 @@ class Urg:
         self._phase_s = float(rng.uniform(0.0, self.period_s))
         self._turn = 0
         self._next = 0
+        self._begun = False
         self._shining = False
+        self._track: deque[tuple[float, BodyState]] = deque(maxlen=TRACK)
         self.finished_s = 0.0
         self._range_m = np.zeros(BEAMS)
         self._cos = np.zeros(BEAMS)
@@ -67,39 +71,48 @@ class Urg:
 
         `finished_s` then tells when the turn of the returned scan had passed step 0.
         """
-        if self._next == 0 and self.started_s <= end_s:
-            self._shining = laser_on
+        if not self._track:
+            self._track.append((begin_s, before))
+        self._track.append((end_s, after))
+        if not self._begun and self.started_s <= end_s:
+            self._begun, self._shining = True, laser_on
+        self._shining &= laser_on
         passed = (end_s - self.started_s) / self._slit_s - FIRST_STEP
         upto = min(BEAMS, max(self._next, math.floor(passed) + 1))
-        if upto > self._next and self._shining and laser_on:
-            self._cast(slice(self._next, upto), begin_s, end_s, before, after)
-        self._next = upto
+        if upto > self._next and (upto == BEAMS or self._scene.alive):
+            if self._shining:
+                self._cast(slice(self._next, upto))
+            self._next = upto
         if passed + FIRST_STEP < STEPS:
             return None
-        scan = self._measure() if self._shining and laser_on else None
+        scan = self._measure() if self._shining else None
         self.finished_s = self.started_s
-        self._next = 0
         self._turn += 1
+        self._next, self._begun = 0, False
         return scan
 
-    def _cast(self, beams: slice, begin_s: float, end_s: float, before: BodyState, after: BodyState) -> None:
-        """Cast the beams that fell into one step, each from where the robot was then."""
+    def _cast(self, beams: slice) -> None:
+        """Cast beams, each from where the robot was at its time; where nothing else moves, a turn at once."""
         config = self._config
-        steps = np.arange(beams.start, beams.stop) + FIRST_STEP
-        share = np.clip((self.started_s + steps * self._slit_s - begin_s) / (end_s - begin_s), 0.0, 1.0)
-        yaw = before.yaw + (after.yaw - before.yaw) * share
+        stamps = [stamp for stamp, _ in self._track]
+        poses = np.array([(s.x, s.y, s.yaw, s.height_m, s.pitch, s.roll) for _, s in self._track])
+        beams_s = self.started_s + np.arange(beams.start + FIRST_STEP, beams.stop + FIRST_STEP) * self._slit_s
+        x, y, yaw = (np.interp(beams_s, stamps, poses[:, column]) for column in range(3))
         cos, sin = np.cos(yaw), np.sin(yaw)
         dx, dy, mount_yaw = config.T_base_laser
-        starts = np.empty((len(steps), 3))
-        starts[:, 0] = before.x + (after.x - before.x) * share + cos * dx - sin * dy
-        starts[:, 1] = before.y + (after.y - before.y) * share + sin * dx + cos * dy
-        starts[:, 2] = after.height_m + config.height_m
         angle = ANGLES_RAD[beams] + mount_yaw
-        directions = np.empty_like(starts)
+        starts, directions = np.empty((len(yaw), 3)), np.empty((len(yaw), 3))
+        starts[:, 0] = x + cos * dx - sin * dy
+        starts[:, 1] = y + sin * dx + cos * dy
+        starts[:, 2] = config.height_m
         directions[:, 0] = np.cos(yaw + angle)
         directions[:, 1] = np.sin(yaw + angle)
-        directions[:, 2] = np.cos(angle) * math.tan(after.pitch) + np.sin(angle) * math.tan(after.roll)
-        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        directions[:, 2] = 0.0
+        if not self._scene.flat:
+            height, pitch, roll = (np.interp(beams_s, stamps, poses[:, column]) for column in range(3, 6))
+            starts[:, 2] += height
+            directions[:, 2] = np.cos(angle) * np.tan(pitch) + np.sin(angle) * np.tan(roll)
+            directions /= np.linalg.norm(directions, axis=1)[:, None]
         reach_m = config.optics.max_m
         hits = self._scene.cast(starts, starts + directions * reach_m)
         length = hits.share * reach_m
@@ -122,6 +135,10 @@ class Urg:
 
     def true_ranges_m(self, state: BodyState) -> NDArray[np.float64]:
         """Return what a perfect sensor would see from a standing robot, float64 (682,), +inf beyond reach."""
-        self._cast(slice(0, BEAMS), self.started_s, self.started_s + self.period_s, state, state)
-        self._next = 0
+        kept = self._track.copy()
+        self._track.clear()
+        self._track.append((self.started_s, state))
+        self._cast(slice(0, BEAMS))
+        self._track.clear()
+        self._track.extend(kept)
         return self._range_m.copy()

@@ -5,6 +5,7 @@
     home                   swinging doors, people, chairs, glass, a ramp, a stairwell (sim/home.toml)
     offices:60:7           a floor of 60 rooms, seed 7
     plan.yaml, plan.yaml@4 a ROS map, or copies of it side by side
+    office#1, home#1       the same on another day: some furniture stands elsewhere
     home.toml              a description (sim.toml_world)
 
 `names()` lists the built-in ones, `describe` says what each is.
@@ -23,6 +24,7 @@ from sim.toml_world import load_toml
 from sim.world import World
 
 MAX_COPIES = 64
+MAX_DAY = 9999
 HOME = Path(__file__).with_name("home.toml")
 
 
@@ -65,8 +67,9 @@ def load(name_or_path: str | Path, *, day: int = 0) -> World:
 
     Raises BadWorld in one line when the name is unknown or the file unusable.
     """
-    text = str(name_or_path)
-    text, copies = _split_copies(text)
+    text, marked_day = _split_number(str(name_or_path), "#", 0, MAX_DAY)
+    text, copies = _split_number(text, "@", 1, MAX_COPIES)
+    day = marked_day or day
     if text == "office":
         return office(copies, day)
     suffix = Path(text).suffix.lower()
@@ -82,12 +85,13 @@ def load(name_or_path: str | Path, *, day: int = 0) -> World:
     return _generated(text)
 
 
-def _split_copies(text: str) -> tuple[str, int]:
-    base, at, number = text.rpartition("@")
-    if not at or "/" in number:
-        return text, 1
-    if not number.isdigit() or not 1 <= int(number) <= MAX_COPIES:
-        raise BadWorld(f"{text}: after @ belongs a number of copies, 1 to {MAX_COPIES}")
+def _split_number(text: str, mark: str, least: int, most: int) -> tuple[str, int]:
+    """Return what stands before a mark and the number behind it, `least` when there is none."""
+    base, found, number = text.rpartition(mark)
+    if not found or "/" in number:
+        return text, least
+    if not number.isdigit() or not least <= int(number) <= most:
+        raise BadWorld(f"{text}: after {mark} belongs a whole number, {least} to {most}")
     return base, int(number)
 
 

@@ -257,36 +257,36 @@ def rays(scans: int) -> None:
     """Compare every scan at random places of a 60-room office with a caster that knows only line segments."""
     world = worlds.load("offices:60")
     simulator = Simulator(world, 0)
-    segments = _segments(world, simulator.config.urg.height_m)
+    segments = segments_of(world, simulator.config.urg.height_m)
     rng = np.random.default_rng(0)
     cells = np.argwhere(clearance_m(world.raster) > 0.25)
-    compared = edges = wrong = 0
+    compared = left_out = wrong = 0
     worst_m = 0.0
     for row, col in cells[rng.integers(0, len(cells), scans)]:
         x, y = world.raster.point(int(row), int(col))
         yaw = float(rng.uniform(-math.pi, math.pi))
         ours = simulator.perfect_scan_m(BodyState(x, y, yaw))
         theirs = cast_segments(segments, (x, y), yaw + ANGLES_RAD, 5.6)
-        smooth = ~(_edge(ours) | _edge(theirs))
+        smooth = ~(edges(ours) | edges(theirs))
         both = smooth & np.isfinite(ours) & np.isfinite(theirs)
         error = np.abs(ours[both] - theirs[both])
         compared += int(smooth.sum())
-        edges += int((~smooth).sum())
+        left_out += int((~smooth).sum())
         wrong += int((error > 0.01).sum()) + int((smooth & (np.isfinite(ours) != np.isfinite(theirs))).sum())
         worst_m = max(worst_m, float(error.max(initial=0.0)))
     simulator.close()
-    print(f"{scans} scans, {compared} beams compared, {edges} at edges left out")
+    print(f"{scans} scans, {compared} beams compared, {left_out} at edges left out")
     print(f"beams off by more than 1 cm: {wrong}; largest difference {worst_m * 1000:.3f} mm")
 
 
-def _edge(ranges: NDArray[np.float64]) -> NDArray[np.bool_]:
+def edges(ranges: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which beams have a neighbour at another depth."""
     filled = np.where(np.isfinite(ranges), ranges, 9.0)
     jump = np.abs(np.diff(filled)) > 0.05
     return np.asarray(np.append(jump, False) | np.insert(jump, 0, False))
 
 
-def _segments(world: World, height_m: float) -> NDArray[np.float64]:
+def segments_of(world: World, height_m: float) -> NDArray[np.float64]:
     """Return the outlines of all boxes at a height, float64 (M, 4): x0 y0 x1 y1."""
     lines = []
     for box in world.boxes:

@@ -168,11 +168,27 @@ MUTANTS = (
     ),
     _m(
         "forward after contact",
-        "v = min(max(allowed.v_mps, -lim.back_off_mps), 0.0)",
-        "v = max(allowed.v_mps, -lim.back_off_mps)",
+        "if allowed.v_mps > 0.0:\n            return Allowed(0.0, 0.0, reason)",
+        "pass",
     ),
-    _m("fast retreat", "v = min(max(allowed.v_mps, -lim.back_off_mps), 0.0)", "v = min(allowed.v_mps, 0.0)"),
-    _m("no retreat", "v = min(max(allowed.v_mps, -lim.back_off_mps), 0.0)", "v = 0.0"),
+    _m(
+        "turning while stopping",
+        "return Allowed(0.0, 0.0, reason)",
+        "return Allowed(0.0, allowed.w_radps, reason)",
+    ),
+    _m(
+        "cliff called bumper",
+        "reason = Reason.CLIFF if evidence.cliff.any else Reason.BUMPER",
+        "reason = Reason.BUMPER",
+    ),
+    _m(
+        "bumper called cliff",
+        "reason = Reason.CLIFF if evidence.cliff.any else Reason.BUMPER",
+        "reason = Reason.CLIFF",
+    ),
+    _m("turning counts as forward", "if allowed.v_mps > 0.0:", "if allowed.v_mps >= 0.0:"),
+    _m("fast retreat", "v = max(allowed.v_mps, -lim.back_off_mps)", "v = allowed.v_mps"),
+    _m("no retreat", "v = max(allowed.v_mps, -lim.back_off_mps)", "v = 0.0"),
     _m(
         "turning at a cliff",
         "return _lessened(allowed, v, 0.0, Reason.CLIFF)",

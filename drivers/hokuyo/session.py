@@ -45,7 +45,7 @@ class HokuyoConfig:
     """Times and limits of the conversation."""
 
     view: View = field(default_factory=View)
-    clock: ClockConfig = field(default_factory=lambda: ClockConfig(STAMP_BITS, latency_s=0.1, bin_s=2.0))
+    clock: ClockConfig = field(default_factory=lambda: ClockConfig(STAMP_BITS, latency_s=0.1))
     """Latency without time adjustment: step 768 is passed 75 ms after the stamp, sending takes the rest."""
     time_readings: int = 9  # each narrows the offset; 2 ms apart over USB
     silence_s: float = 0.6

@@ -147,11 +147,11 @@ class Compatibility(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BaseInfo:
-    """Who the robot is; comes once all three are known, and when one changes."""
+    """Who the robot is; comes once all three are known, or when the firmware did not tell the others."""
 
-    hardware: Version
+    hardware: Version | None
     firmware: Version
-    udid: Udid
+    udid: Udid | None
     compatibility: Compatibility
     advice: str
     """One line for the user; empty when all is well."""

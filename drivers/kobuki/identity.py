@@ -19,6 +19,10 @@ class AskConfig:
 
     every_s: float = 0.5
     times: int = 20
+    patience: int = 4
+    """After so many questions the firmware is judged by its version alone: the first ones told nothing
+    else.
+    """
 
 
 class Identity:
@@ -30,6 +34,7 @@ class Identity:
         self.firmware: Version | None = None
         self.udid: Udid | None = None
         self.gains: Gains | None = None
+        self._told: BaseInfo | None = None
         self._asked = 0
         self._asked_gains = 0
         self._next_ask_s = float("-inf")
@@ -61,18 +66,14 @@ class Identity:
     def take(self, frame: Feedback) -> list[BaseInfo | GainsReport]:
         """Take what a frame tells about the base."""
         events: list[BaseInfo | GainsReport] = []
-        before = (self.hardware, self.firmware, self.udid)
         self.hardware = frame.hardware or self.hardware
         self.firmware = frame.firmware or self.firmware
         self.udid = frame.udid or self.udid
-        if (
-            before != (self.hardware, self.firmware, self.udid)
-            and self.hardware
-            and self.firmware
-            and self.udid
-        ):
-            compatibility, advice = judge_firmware(self.firmware)
-            events.append(BaseInfo(self.hardware, self.firmware, self.udid, compatibility, advice))
+        if self.firmware is not None and (self._asked >= self._config.patience or not self._missing()):
+            info = BaseInfo(self.hardware, self.firmware, self.udid, *judge_firmware(self.firmware))
+            if info != self._told:
+                self._told = info
+                events.append(info)
         if frame.gains is not None:
             self.gains = frame.gains
             events.append(GainsReport(frame.gains))

@@ -9,7 +9,7 @@ from lemtomap.nav import kernels
 from lemtomap.nav.costmap import TIGHT_COST, Costs
 from lemtomap.nav.types import Points
 
-FIELD_MARGIN_M = 2.5
+FIELD_MARGIN_M = 1.5
 """The field is also known this much cost beyond the robot, for trajectories that start by leading away."""
 
 

@@ -139,6 +139,7 @@ class Navigator:
         speed = REST if bumps else self._speed(twist)  # a bump has stopped the robot, or must
         moment = _Moment(map_view, graph, T_odom_base, T_grid_base, speed, now_s)
         self._way_back.drove(T_odom_base)
+        self.surroundings.recall(graph, now_s)
         self.surroundings.take(map_view, _as_sightings(scan_points_base, T_odom_base, now_s))
         self._feel(bumps, moment)
         output = self._act(moment) if self._goal is not None else self._rest(moment)

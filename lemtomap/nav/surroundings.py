@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -12,12 +13,22 @@ from lemtomap.nav.motion.collision import points_now
 from lemtomap.nav.types import Contact, ContactKind, Points, Sighting
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import Bumped
-from lemtomap.types import MapView
+from lemtomap.topo.graph import Mark
+from lemtomap.types import MapView, RouteGraph
 
 FRESH_S = 0.6
 """Range points older than this say nothing about what is in front of the body now."""
 HOLD_M = 0.9
 SAME_M = 0.05
+
+
+@runtime_checkable
+class RemembersMarks(Protocol):
+    """A graph on file that keeps what was felt rather than seen."""
+
+    def marks(self) -> Sequence[Mark]:
+        """Return them all."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +48,18 @@ class Surroundings:
         self._costmap = Costmap(config.costmap, config.body)
         self._sightings: dict[str, Sighting] = {}
         self._hazards: list[Hazard] = []
-        self._ready = False
+        self._recalled = False
 
-    def remember(self, hazards: Sequence[Hazard]) -> None:
-        """Take hazards known from earlier runs."""
-        self._hazards.extend(hazards)
+    def recall(self, graph: RouteGraph, now_s: float) -> None:
+        """Take over, once, what earlier drives felt, if the graph keeps it."""
+        if not self._recalled and isinstance(graph, RemembersMarks):
+            for mark in graph.marks():
+                self._keep(Hazard(mark.node_id, (mark.x_m, mark.y_m), now_s))
+        self._recalled = True
 
     def take(self, map_view: MapView, sightings: Sequence[Sighting]) -> None:
         """Take the newest window and what the sensors saw since the last call."""
         self._costmap.follow_window(map_view.grid)
-        self._ready = True
         for sighting in sightings:
             last = self._sightings.get(sighting.source)
             if last is None or sighting.stamp_s > last.stamp_s:

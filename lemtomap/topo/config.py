@@ -18,6 +18,7 @@ class TopoConfig:
     near_neighbour_gain: float = (
         0.02  # an edge must shorten the way between its ends by this share (Fig. 3-9)
     )
+    near_neighbour_sigma_m: float = 0.2  # a node only predicted must be predicted this well: a robot's radius
     robot_radius_m: float = 0.18  # Kobuki's body, 351.5 mm across
     occupied_from: int = 50  # occupancy of GridView that stops the robot
     place_radius_m: float = 5.0  # half the window less the distance at which data is taken
@@ -26,6 +27,7 @@ class TopoConfig:
     place_alike_score: float = 0.8  # a visit that sees this share of a place finds it unchanged
     place_stale_visits: int = 3  # so many visits in a row that do not, and it is taken anew
     match: MatchConfig = field(default_factory=MatchConfig)
+    fresh_m: float = 10.0  # way after which a node's place in the window is measured again
     align_again_m: float = 0.3  # a refused match is tried again after this way
     align_widen: float = 2.0  # and its prediction believed that much less (variance), up to
     align_widest_m: float = 0.5  # this standard deviation: half a node distance

@@ -10,10 +10,12 @@ from lemtomap.se2 import Pose, inverse, transform
 from lemtomap.topo.align import HitMap, Match, match_place
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Place
-from lemtomap.topo.local import Standing
+from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.place import decode_place, encode_place
 from lemtomap.types import GridView
+
+AGEING = 0.7  # of the way a measurement stays fresh: then the place is taken, however near the robot stays
 
 Describe = Callable[[NDArray[np.float64]], bytes]
 """Boundary points around a node, float64 (N, 2), node frame → its rotation-invariant descriptor."""
@@ -50,18 +52,17 @@ class PlaceKeeper:
         if points_base is not None and len(points_base):
             self.hits.add(T_grid_base, points_base)
 
-    def take_ripe(
-        self, standings: dict[int, Standing], T_grid_base: Pose, grid: GridView, now_s: float
-    ) -> list[Taken]:
-        """Take the data of due nodes that the robot has left far enough behind."""
+    def take_ripe(self, local: LocalMap, T_grid_base: Pose, grid: GridView, now_s: float) -> list[Taken]:
+        """Take the data of due nodes that the robot has left behind or that soon must be measured again."""
         taken = []
         for node_id in list(self._due):
-            standing = standings.get(node_id)
+            standing = local.standings.get(node_id)
             if standing is None or not standing.anchored:
                 del self._due[node_id]  # forgotten before it was ripe
                 continue
             away_m = float(np.hypot(*(standing.T_grid_node[:2] - T_grid_base[:2])))
-            if away_m >= self.config.place_taken_at_m:
+            age_m = local.way_m - standing.measured_m
+            if away_m >= self.config.place_taken_at_m or age_m >= AGEING * self.config.fresh_m:
                 taken += self._take(node_id, standing, grid, now_s)
                 del self._due[node_id]
         return taken

@@ -11,10 +11,11 @@ import numpy as np
 
 from lemtomap.se2 import Pose
 from lemtomap.topo import kernels
+from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.solve import Problem, solve_local
-from lemtomap.types import GridView
+from lemtomap.types import EdgeType, GridView
 
 EDGE_MARGIN_M = 1.0  # a node nearer to the window's border than this has lost its surroundings
 
@@ -33,6 +34,8 @@ class Standing:
     """Measured in this window, rather than predicted by the graph."""
     born: bool = False
     """Made in this window: no match stands behind its pose."""
+    measured_m: float = 0.0
+    """Way of the robot when it was measured: the longer ago, the more the window drifted since."""
     seen: Covariance | None = None
     """What the window alone says of the pose, the graph's prediction apart; None when it says nothing."""
 
@@ -40,12 +43,13 @@ class Standing:
 class LocalMap:
     """Poses of nearby nodes in the grid frame, anchored at the associated node."""
 
-    def __init__(self, graph: PagedGraph, radius_m: float, limit: int) -> None:
+    def __init__(self, graph: PagedGraph, config: TopoConfig) -> None:
         self._graph = graph
-        self._radius_m = radius_m
-        self._limit = limit
+        self._config = config
         self.standings: dict[int, Standing] = {}
         self.reached: dict[int, Reached] = {}
+        self.way_m = 0.0
+        """Way of the robot so far."""
 
     def anchor(
         self,
@@ -57,7 +61,9 @@ class LocalMap:
         seen: Covariance | None = None,
     ) -> None:
         """Set a node's pose as measured in this window; `seen` is the covariance of the measurement alone."""
-        self.standings[node_id] = Standing(T_grid_node, covariance, anchored=True, born=born, seen=seen)
+        self.standings[node_id] = Standing(
+            T_grid_node, covariance, anchored=True, born=born, measured_m=self.way_m, seen=seen
+        )
 
     def doubt(self, node_id: int, widen: float, widest_m: float) -> None:
         """Believe a prediction less: the window did not bear it out."""
@@ -88,11 +94,12 @@ class LocalMap:
 
         The associated node must stand already. Holds: afterwards `standings` has exactly the nodes reached.
         """
-        self.reached = self._graph.reach(associated_id, self._radius_m, self._limit)
+        config = self._config
+        self.reached = self._graph.reach(associated_id, config.local_radius_m, config.local_limit)
         settled: dict[int, Standing] = {}
         for node_id, reached in self.reached.items():
             known = self.standings.get(node_id)
-            if known is not None and (known.anchored or reached.via is None):
+            if known is not None and (reached.via is None or (known.anchored and self._is_fresh(known))):
                 settled[node_id] = known
             elif reached.via is not None:
                 from_id = reached.via.other(node_id)
@@ -106,6 +113,10 @@ class LocalMap:
                 )
                 settled[node_id] = Standing(T_grid_node, covariance, anchored=False)
         self.standings = self._solved(settled)
+
+    def _is_fresh(self, standing: Standing) -> bool:
+        """Tell whether a node was measured so lately that the window cannot have drifted away from it."""
+        return self.way_m - standing.measured_m <= self._config.fresh_m
 
     def _solved(self, settled: dict[int, Standing]) -> dict[int, Standing]:
         """Fit the nodes that are not anchored to all edges among them (thesis, Figure 3-7c).
@@ -134,3 +145,27 @@ class LocalMap:
             for edge in self._graph.edges_of(node_id)
             if edge.source_id == node_id and edge.target_id in settled
         ]
+
+
+class EdgePicture:
+    """The edges among the nodes that stand nearby, for pictures; found again only when the map changed."""
+
+    def __init__(self, graph: PagedGraph, local: LocalMap) -> None:
+        self._graph = graph
+        self._local = local
+        self._key = (-1, -1)
+        self._edges: list[tuple[int, int, int, EdgeType]] = []
+
+    def edges(self, associated_id: int) -> list[tuple[int, int, int, EdgeType]]:
+        """Return (edge ID, source, target, type)."""
+        key = (self._graph.store.version, associated_id)
+        if self._key != key:
+            self._key = key
+            standings = self._local.standings
+            self._edges = [
+                (edge.edge_id, edge.source_id, edge.target_id, edge.type)
+                for node_id in standings
+                for edge in self._graph.edges_of(node_id)
+                if edge.source_id == node_id and edge.target_id in standings
+            ]
+        return self._edges

@@ -2,22 +2,21 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.errors import LemtomapError
 from lemtomap.se2 import Pose, adjoint, compose, inverse
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import NavEvent
-from lemtomap.topo.graph import Covariance, Edge, Place, chain_covariance, measured_alone
+from lemtomap.topo.graph import Covariance, Edge, chain_covariance, measured_alone
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
-from lemtomap.topo.local import LocalMap, Standing
+from lemtomap.topo.local import EdgePicture, LocalMap, Standing
 from lemtomap.topo.neighbours import NeighbourFinder, in_sight
 from lemtomap.topo.paging import PagedGraph
+from lemtomap.topo.protocols import NotStarted, Recogniser, Transform
 from lemtomap.topo.stand import last_stand, put_last_stand
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
@@ -25,43 +24,6 @@ from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
 
 COVARIANCE_FLOOR = np.diag([0.002**2, 0.002**2, np.deg2rad(0.1) ** 2])
 """No relation between two places is known better: a tenth of a grid cell's quantisation noise."""
-
-
-class NotStarted(LemtomapError):
-    """A snapshot was asked for before the first scan."""
-
-
-@dataclass(frozen=True, slots=True)
-class Transform:
-    """How the local grid map transform of the associated node is known (thesis, section 3-3-2)."""
-
-    measured: bool
-    """False: the graph's prediction stands in."""
-    covariance: Covariance
-    """float64 (3, 3), axes of the node."""
-    score: float = 1.0
-    reason: str = ""
-    """Why it is not measured."""
-
-
-class Recogniser(Protocol):
-    """Explicit loop closing, as the mapper sees it."""
-
-    def describe(self, points_node: NDArray[np.float64]) -> bytes:
-        """Return the rotation-invariant descriptor of boundary points, float64 (N, 2), node frame."""
-        ...
-
-    def place_taken(self, node_id: int, place: Place) -> None:
-        """Take note of a node's localisation data, new or renewed."""
-        ...
-
-    def at_node(self, mapper: "TopoMapper", *, born: bool) -> None:
-        """A node was made or became the associated one."""
-        ...
-
-    def update(self, mapper: "TopoMapper") -> None:
-        """Work a slice after each scan; may call close_loop, revoke, start_component or relocate."""
-        ...
 
 
 @dataclass(slots=True)
@@ -95,7 +57,7 @@ class TopoMapper:
         self.config = config
         self.store = store
         self.graph = PagedGraph(store, config.paged_nodes)
-        self.local = LocalMap(self.graph, config.local_radius_m, config.local_limit)
+        self.local = LocalMap(self.graph, config)
         self.keeper = PlaceKeeper(config, self.graph, recogniser.describe if recogniser else None)
         self.trail = ScanTrail.temporary() if trail is None else trail
         self.level = level
@@ -110,7 +72,7 @@ class TopoMapper:
         self._transform = Transform(measured=True, covariance=np.zeros((3, 3)))
         self._tried_m = 0.0
         self._now: _Now | None = None
-        self._picture: tuple[tuple[int, int], list[tuple[int, int, int, EdgeType]]] = ((-1, -1), [])
+        self._picture = EdgePicture(self.graph, self.local)
 
     @property
     def associated_id(self) -> int:
@@ -178,6 +140,7 @@ class TopoMapper:
         from_base, to_base = before.T_grid_base, after.T_grid_base
         self._drift = kernels.drifted(self._drift, from_base, to_base, after.step_covariance)
         self.travelled_m += math.hypot(to_base[0] - from_base[0], to_base[1] - from_base[1])
+        self.local.way_m = self.travelled_m
 
     def _associate_or_create(self) -> None:
         """Only a neighbour or a new node can come next, and only one that no wall hides.
@@ -223,8 +186,8 @@ class TopoMapper:
         self._associated_id = node_id
         node = self.graph.node(node_id)
         self.graph.put_node(replace(node, visits=node.visits + 1))
-        self._align_associated()
         self._take_places()
+        self._align_associated()
         if self._recogniser is not None:
             self._recogniser.at_node(self, born=False)
 
@@ -234,12 +197,12 @@ class TopoMapper:
         node_id = self._birth()
         covariance = covariance + COVARIANCE_FLOOR
         self.graph.add_edge(Edge(0, previous_id, node_id, T_previous_new, covariance, EdgeType.ODOMETRY))
+        self._take_places()
         self.local.settle(node_id)
         self._anchor_beside(node_id)
         grid = self._require().grid
         for edge in self._neighbours.edges_for(node_id, self.graph, self.local, grid):
             self.graph.add_edge(edge)
-        self._take_places()
         if self._recogniser is not None:
             self._recogniser.at_node(self, born=True)
 
@@ -302,7 +265,7 @@ class TopoMapper:
     def _take_places(self) -> None:
         now = self._require()
         slam = now.slam
-        taken = self.keeper.take_ripe(self.local.standings, slam.T_grid_base, now.grid, slam.stamp_s)
+        taken = self.keeper.take_ripe(self.local, slam.T_grid_base, now.grid, slam.stamp_s)
         self._tell(taken)
 
     def _tell(self, taken: list[Taken]) -> None:
@@ -384,26 +347,13 @@ class TopoMapper:
             T_grid_base=now.slam.T_grid_base,
             associated_id=self._associated_id,
             T_grid_node=poses,
-            edges=self._edges_in_view(),
+            edges=self._picture.edges(self._associated_id),
             quality=now.slam.quality,
             diversity=now.slam.diversity,
             lost=self.lost,
             particles=particles,
             names=names,
         )
-
-    def _edges_in_view(self) -> list[tuple[int, int, int, EdgeType]]:
-        key = (self.store.version, self._associated_id)
-        if self._picture[0] != key:
-            standings = self.local.standings
-            edges = [
-                (edge.edge_id, edge.source_id, edge.target_id, edge.type)
-                for node_id in standings
-                for edge in self.graph.edges_of(node_id)
-                if edge.source_id == node_id and edge.target_id in standings
-            ]
-            self._picture = (key, edges)
-        return self._picture[1]
 
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""

@@ -8,7 +8,7 @@ from lemtomap.se2 import Pose, between
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
-from lemtomap.topo.local import LocalMap
+from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.types import EdgeType, GridView
 
@@ -22,8 +22,8 @@ class NeighbourFinder:
     def edges_for(self, node_id: int, graph: PagedGraph, local: LocalMap, grid: GridView) -> Iterator[Edge]:
         """Iterate over the near-neighbour edges of a node, nearest first; the caller adds each at once.
 
-        A candidate lies within the local radius (D_nn) over edges and stands in the window by measurement,
-        is on the same level and directly navigable, and the edge shortens the way to it.
+        A candidate lies within the local radius (D_nn) over edges, stands in the window by measurement or by
+        a sure prediction, is on the same level and directly navigable, and the edge shortens the way to it.
         """
         level = graph.node(node_id).level
         here = local.standings[node_id]
@@ -41,9 +41,18 @@ class NeighbourFinder:
         found = []
         for other_id, standing in local.standings.items():
             line_m = round(float(np.hypot(standing.T_grid_node[0] - x, standing.T_grid_node[1] - y)), 6)
-            if other_id != node_id and standing.anchored and line_m <= self._config.near_neighbour_max_m:
+            if (
+                other_id != node_id
+                and line_m <= self._config.near_neighbour_max_m
+                and self._is_sure(standing)
+            ):
                 found.append((other_id, line_m))
         return sorted(found, key=lambda candidate: (candidate[1], candidate[0]))
+
+    def _is_sure(self, standing: Standing) -> bool:
+        """Tell whether a node stands in the window by measurement, or is predicted well enough."""
+        variance = float(np.linalg.eigvalsh(standing.covariance[:2, :2])[-1])
+        return standing.anchored or variance <= self._config.near_neighbour_sigma_m**2
 
     def _shortens(
         self, node_id: int, other_id: int, line_m: float, graph: PagedGraph, reached: dict[int, Reached]
@@ -60,7 +69,7 @@ class NeighbourFinder:
         here, there = local.standings[node_id], local.standings[other_id]
         T_node_other = between(here.T_grid_node, there.T_grid_node)
         covariance = chain_covariance(here.covariance, T_node_other, there.covariance)
-        share = independent_share(covariance, _chain(other_id, local.reached))
+        share = independent_share(covariance, _chain(other_id, local.reached)) if there.anchored else 0.0
         return Edge(0, node_id, other_id, T_node_other, covariance, EdgeType.NEAR_NEIGHBOUR, share)
 
 

@@ -8,16 +8,17 @@ from typing import Any, Self
 import numpy as np
 
 from lemtomap.topo import schema
-from lemtomap.topo.graph import USUAL_SPEED_MPS
-from lemtomap.topo.rows import planar_length_m
-from lemtomap.types import EdgeTable, RouteEdge
+from lemtomap.topo.graph import USUAL_SPEED_MPS, Mark, Placeholder, detour
+from lemtomap.topo.rows import placeholder_from, planar_length_m, type_code
+from lemtomap.types import EdgeTable, EdgeType, RouteEdge
 
 _NEIGHBOURS = (
-    "SELECT id, target, time, blocked, measure FROM edge WHERE source = ?1 "
-    "UNION ALL SELECT id, source, time, blocked, measure FROM edge WHERE target = ?1"
+    "SELECT id, target, time, blocked, measure, type FROM edge WHERE source = ?1 "
+    "UNION ALL SELECT id, source, time, blocked, measure, type FROM edge WHERE target = ?1"
 )
-_ALL_EDGES = "SELECT id, source, target, time, blocked, measure FROM edge"
+_ALL_EDGES = "SELECT id, source, target, time, blocked, measure, type FROM edge"
 _EDGES_AT = _ALL_EDGES + " WHERE source = ?1 OR target = ?1"
+_DETOURS = np.array([detour(kind) for kind in sorted(EdgeType, key=type_code)])  # by the file's type code
 CACHED_NODES = (
     200_000  # some 500 bytes each: at most about 100 MB, reached only by planning across such a map
 )
@@ -79,9 +80,9 @@ class TopoReader:
         with schema.guarded(self.path):
             rows = self._db.execute(_NEIGHBOURS, (node_id,)).fetchall()
         edges = []
-        for edge_id, other_id, time_s, blocked_s, measure in rows:
+        for edge_id, other_id, time_s, blocked_s, measure, code in rows:
             length_m = planar_length_m(measure)
-            expected_s = length_m / USUAL_SPEED_MPS if time_s is None else time_s
+            expected_s = length_m / USUAL_SPEED_MPS * _DETOURS[code] if time_s is None else time_s
             edges.append(RouteEdge(edge_id, other_id, length_m, expected_s, blocked_s or 0.0))
         return tuple(edges)
 
@@ -111,6 +112,17 @@ class TopoReader:
             rows = self._db.execute("SELECT DISTINCT node FROM change WHERE version > ?", (version,))
             return [int(node_id) for (node_id,) in rows]
 
+    def openings(self) -> list[Placeholder]:
+        """Return the openings towards unexplored space, explored and closed ones too."""
+        with schema.guarded(self.path):
+            rows = self._db.execute("SELECT id, node, x, y, yaw, width, state FROM placeholder ORDER BY id")
+            return [placeholder_from(row) for row in rows]
+
+    def marks(self) -> list[Mark]:
+        """Return everything that was felt rather than seen."""
+        with schema.guarded(self.path):
+            return [Mark(*row) for row in self._db.execute("SELECT id, node, kind, x, y, stamp FROM mark")]
+
     def node_of(self, name: str) -> int | None:
         """Return the node that bears this name."""
         with schema.guarded(self.path):
@@ -129,16 +141,17 @@ class TopoReader:
 
 
 def _table(rows: Sequence[tuple[Any, ...]]) -> EdgeTable:
-    edge_id, source, target, time, blocked, measure = zip(*rows, strict=True) if rows else ((),) * 6
+    edge_id, source, target, time, blocked, measure, code = zip(*rows, strict=True) if rows else ((),) * 7
     step = len(measure[0]) // 8 if measure else 2
     values = np.frombuffer(b"".join(measure), dtype="<f8").reshape(-1, step)
     length_m = np.hypot(values[:, 0], values[:, 1])
     learnt_s = np.array(time, dtype=np.float64)  # None becomes NaN
+    straight_s = length_m / USUAL_SPEED_MPS * _DETOURS[np.array(code, dtype=np.intp)]
     return EdgeTable(
         edge_id=np.array(edge_id, dtype=np.int64),
         source_id=np.array(source, dtype=np.int64),
         target_id=np.array(target, dtype=np.int64),
         length_m=length_m.astype(np.float32),
-        time_s=np.where(np.isnan(learnt_s), length_m / USUAL_SPEED_MPS, learnt_s).astype(np.float32),
+        time_s=np.where(np.isnan(learnt_s), straight_s, learnt_s).astype(np.float32),
         blocked_until_s=np.nan_to_num(np.array(blocked, dtype=np.float64)),
     )

@@ -78,7 +78,10 @@ II = [("LASR", "OFF"), ("TIME", "00C350"), ("STAT", "Sensor works well.")]
 class Urg:
     """A UG01: feed it command bytes with the time, get reply bytes; `scan` gives a turn while it streams."""
 
-    def __init__(self, *, scip1=False, time_mode=False, refuse_time=False, mute=(), boot_s=0.0):
+    def __init__(
+        self, *, scip1=False, time_mode=False, refuse_time=False, mute=(), boot_s=0.0, parameters=()
+    ):
+        self.parameters = list(parameters) or PP
         self.scip1, self.time_mode, self.refuse_time = scip1, time_mode, refuse_time
         self.mute = set(mute)
         self.epoch_s = boot_s
@@ -126,7 +129,7 @@ class Urg:
         elif name == b"VV":
             return scip_fields(line, VV)
         elif name == b"PP":
-            return scip_fields(line, PP)
+            return scip_fields(line, self.parameters)
         elif name == b"II":
             return scip_fields(line, II)
         elif name == b"MD":

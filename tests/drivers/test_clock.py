@@ -38,7 +38,7 @@ def test_bursts_of_16_ms_drift_and_wraps_do_not_reach_the_stamps(drift):
 
 
 def test_laser_stamps_wrap_after_four_hours_unnoticed():
-    clock = DeviceClock(ClockConfig(bits=24, latency_s=0.1, bin_s=2.0))
+    clock = DeviceClock(ClockConfig(bits=24, latency_s=0.1))
     error = run(
         clock,
         bits=24,
@@ -82,8 +82,22 @@ def test_a_single_absurd_stamp_is_refused_and_a_restarted_device_is_followed():
     assert clock.resets == 1
 
 
+@pytest.mark.parametrize("anchored", [False, True])
+def test_a_device_clock_that_stood_still_is_followed_within_three_seconds(anchored):
+    clock = DeviceClock(ClockConfig(bits=16))
+    if anchored:
+        clock.anchor(980, 99.0, 99.98)
+    errors = []
+    for i in range(1000):
+        true_s = 100.0 + 0.02 * i + (0.4 if i >= 500 else 0.0)
+        errors.append(clock.map(1000 + 20 * i, true_s + 0.001 * (i % 7)) - true_s)
+    assert np.abs(errors[200:500]).max() < 0.03
+    assert np.abs(errors[501:550]) == pytest.approx(np.full(49, 0.4), abs=0.03)  # not yet believed
+    assert np.abs(errors[660:]).max() < 0.03
+
+
 def test_two_way_exchange_takes_the_stream_latency_off():
-    clock = DeviceClock(ClockConfig(bits=24, latency_s=0.1, bin_s=2.0))
+    clock = DeviceClock(ClockConfig(bits=24, latency_s=0.1))
     sync = TimeSync()
     for i in range(9):  # device time = host time - 500 s; 1 ms there, 3 ms back; truncated to ms
         sent = 1000.0 + 0.0057 * i

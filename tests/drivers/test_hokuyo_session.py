@@ -106,6 +106,22 @@ def test_scan_has_its_first_beams_time_its_angles_and_its_codes_told_apart():
     assert (scan.range_min_m, scan.range_max_m, scan.complete, scan.missed) == (0.02, 5.6, True, 0)
 
 
+def test_a_longer_sister_is_served_by_what_it_tells_of_itself():
+    told = {"DMIN": 23, "DMAX": 60000, "ARES": 1440, "AMIN": 0, "AMAX": 1080, "AFRT": 540, "SCAN": 2400}
+    utm = [
+        ("MODL", "UTM-30LX(Hokuyo Automatic Co.,Ltd.)"),
+        *((key, str(value)) for key, value in told.items()),
+    ]
+    bench = Bench(Urg(boot_s=-1000.0, parameters=utm))
+    bench.ranges = [1, 3, 22, 23, 30000, *[5000] * 1076]
+    scan = of(bench.first_scan().events, LaserScan)[0]
+    assert bench.urg.heard[-1] == b"MD0000108001000"
+    assert np.isposinf(scan.ranges_m[0])  # nothing seen is code 1 here
+    assert np.isnan(scan.ranges_m[1:3]).all()
+    assert scan.ranges_m[3:6] == pytest.approx([0.023, 30.0, 5.0])
+    assert (scan.angle_min_rad, scan.range_max_m) == (pytest.approx(-0.75 * math.pi), 60.0)
+
+
 def test_view_limits_angles_clusters_and_skips():
     view = View(angle_min_rad=-math.pi / 2, angle_max_rad=math.pi / 2, cluster=3, skip=1)
     bench = Bench(session=HokuyoSession(HokuyoConfig(view=view)))

@@ -88,6 +88,16 @@ def test_versions_are_asked_for_until_they_come_and_gains_only_of_firmware_that_
     assert sent == b""
 
 
+def test_firmware_that_tells_only_its_version_is_judged_all_the_same():
+    frames = [
+        kobuki_feedback(i, extras=bytes.fromhex("0B027B00") if i % 25 == 3 else b"") for i in range(150)
+    ]
+    events, _ = stream(KobukiSession(), frames)
+    (info,) = of(events, BaseInfo)
+    assert (info.hardware, info.firmware, info.udid) == (None, Version(1, 0, 0), None)
+    assert info.compatibility is Compatibility.UNTESTED
+
+
 @pytest.mark.parametrize(
     ("version", "verdict", "words"),
     [

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from lemtomap import se2
 from robot.cli import main
 
 WIDTH_M, DEPTH_M = 7.0, 5.0
@@ -55,9 +56,10 @@ def test_the_trajectory_is_the_drive(out):
     rows = np.loadtxt(out / "trajectory.tum")
     assert rows.shape == (SCANS, 8)
     assert rows[0, 0] == 976052857.25
-    truth = np.array([1.0 + 0.06 * (SCANS - 1), 1.0 + 0.6 * np.sin((SCANS - 1) / 10)]) - (1.0, 1.0)
-    turned = np.array([[np.cos(0.4), np.sin(0.4)], [-np.sin(0.4), np.cos(0.4)]]) @ truth
-    assert rows[-1, 1:3] - rows[0, 1:3] == pytest.approx(turned, abs=0.05)
+    first, last = (np.array([row[1], row[2], 2 * np.arctan2(row[6], row[7])]) for row in rows[[0, -1]])
+    k = SCANS - 1
+    truth = se2.between([1.0, 1.0, 0.4], [1.0 + 0.06 * k, 1.0 + 0.6 * np.sin(k / 10), 0.4 * np.cos(k / 10)])
+    assert se2.between(first, last) == pytest.approx(truth, abs=0.05)
 
 
 def test_summary_map_and_picture_agree(out):

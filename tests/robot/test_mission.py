@@ -8,7 +8,8 @@ from lemtomap.errors import BadSetting
 from lemtomap.nav.types import NavOutput, NavState
 from lemtomap.types import RouteEdge, Twist
 from robot.exchange import MissionState
-from robot.missions import GoTo, Moment, farthest_node, parse_mission
+from robot.missions import GoTo, Moment, parse_mission
+from robot.ways import farthest_node
 
 
 class Line:
@@ -62,6 +63,38 @@ def test_missions_follow_one_another():
     assert mission.step(moment(NavState.ARRIVED, 2)).state is MissionState.RUNNING
     assert mission.step(moment(NavState.ARRIVED, 3)).goal.node_id == 1
     assert mission.step(moment(NavState.ARRIVED, 4)).state is MissionState.DONE
+
+
+def test_a_tour_passes_near_every_node_and_comes_back():
+    mission, here, cycle, visited = parse_mission("tour"), 3, 0, []
+    for _ in range(40):
+        order = mission.step(moment(NavState.IDLE if not visited else NavState.DRIVING, cycle, here))
+        if order.state is MissionState.DONE:
+            break
+        if order.goal is not None:
+            visited.append(order.goal.node_id)
+        cycle += 1
+        target = visited[-1]
+        if here == target:
+            order = mission.step(moment(NavState.ARRIVED, cycle, here))
+            if order.state is MissionState.DONE:
+                break
+            if order.goal is not None:
+                visited.append(order.goal.node_id)
+            cycle += 1
+        here += (target > here) - (target < here)
+    assert order.state is MissionState.DONE
+    assert "0 places not reached" in order.text
+    assert max(visited) >= 6
+    assert visited[-1] == 1
+
+
+def test_a_tour_goes_on_after_a_place_it_cannot_reach():
+    mission = parse_mission("tour")
+    first = mission.step(moment(NavState.IDLE, 1, 1)).goal.node_id
+    order = mission.step(moment(NavState.FAILED, 2, 1))
+    assert order.state is MissionState.RUNNING
+    assert order.goal.node_id != first
 
 
 @pytest.mark.parametrize("text", ["", "goto:", "fly", "explore,", "goto"])

@@ -73,6 +73,10 @@ LESSENED = [
         ("cliff back", (-0.2, 0.2), {"cliff": side}, Allowed(-0.1, 0.0, Reason.CLIFF)),
         ("cliff straight back", (-0.05, 0.0), {"cliff": side}, Allowed(-0.05, 0.0, Reason.CLEAR)),
         ("bump forward", (0.3, 0.0), {"bumper": side}, Allowed(0.0, 0.0, Reason.BUMPER)),
+        ("bump in an arc", (0.01, 0.4), {"bumper": side}, Allowed(0.0, 0.0, Reason.BUMPER)),
+        ("cliff in an arc", (0.01, 0.4), {"cliff": side}, Allowed(0.0, 0.0, Reason.CLIFF)),
+        ("bump turning", (0.0, 0.4), {"bumper": side}, Allowed(0.0, 0.4, Reason.CLEAR)),
+        ("cliff turning", (0.0, 0.4), {"cliff": side}, Allowed(0.0, 0.0, Reason.CLIFF)),
         ("bump back", (-0.2, 0.9), {"bumper": side}, Allowed(-0.1, 0.5, Reason.BUMPER)),
         ("bump turn right", (0.0, -0.9), {"bumper": side}, Allowed(0.0, -0.5, Reason.BUMPER)),
         ("bump slow back", (-0.1, 0.5), {"bumper": side}, Allowed(-0.1, 0.5, Reason.CLEAR)),
@@ -222,3 +226,8 @@ def test_free_travel_without_points_or_motion_is_endless():
     assert free_travel_m(np.zeros((0, 2)), 0.3, 0.1, 0.2) == math.inf
     assert free_travel_m(np.array([[0.1, 0.0]]), 0.0, 0.1, 0.2) == math.inf
     assert free_travel_m(np.array([[0.0, 3.0]]), 0.3, 0.0, 0.2) == math.inf
+
+
+def test_flags_of_two_moments_join():
+    assert (Sides(left=True) | Sides(right=True)) == Sides(left=True, right=True)
+    assert (Sides() | Sides(centre=True)) == Sides(centre=True)

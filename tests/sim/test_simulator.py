@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from sim import worlds
+from sim.body import BodyState
 from sim.errors import BadWorld, Unplugged
 from sim.faults import Faults, LinkFaults
+from sim.raster import clearance_m
 from sim.simulator import Simulator
+from sim.urg import ANGLES_RAD
+from tools.bench_sim import cast_segments, edges, segments_of
 
 STREAM = b"MD0044072501000\n"
 
@@ -150,3 +154,24 @@ def test_ros_map_becomes_few_boxes_and_bad_ones_one_line(tmp_path):
     settings.write_text(text.replace("0.05", "x"))
     with pytest.raises(BadWorld, match=r"m\.pgm: not a readable image|not numbers"):
         worlds.load(settings)
+
+
+def test_rays_agree_with_a_caster_that_knows_only_line_segments():
+    world = worlds.load("offices:20:4")
+    simulator = Simulator(world, 0)
+    segments = segments_of(world, simulator.config.urg.height_m)
+    rng = np.random.default_rng(1)
+    cells = np.argwhere(clearance_m(world.raster) > 0.25)
+    compared = 0
+    for row, col in cells[rng.integers(0, len(cells), 25)]:
+        x, y = world.raster.point(int(row), int(col))
+        yaw = float(rng.uniform(-3, 3))
+        ours = simulator.perfect_scan_m(BodyState(x, y, yaw))
+        theirs = cast_segments(segments, (x, y), yaw + ANGLES_RAD, 5.6)
+        same = ~(edges(ours) | edges(theirs))
+        assert np.array_equal(np.isfinite(ours[same]), np.isfinite(theirs[same]))
+        both = same & np.isfinite(ours)
+        assert np.abs(ours[both] - theirs[both]).max(initial=0.0) < 0.02
+        compared += int(both.sum())
+    simulator.close()
+    assert compared > 10_000

@@ -98,6 +98,7 @@ def test_toml_world_is_built_and_furniture_moves_by_day(tmp_path):
     sofa = world.raster.cell(6.0, 4.4)
     assert world.raster.occupied[sofa]
     assert not worlds.load(path, day=1).raster.occupied[sofa]
+    assert worlds.load(f"{path}#1").boxes == worlds.load(path, day=1).boxes
 
 
 @pytest.mark.parametrize(
@@ -130,7 +131,7 @@ def test_bad_world_files_are_one_line_with_file_and_place(tmp_path, before, afte
 
 
 @pytest.mark.parametrize(
-    "name", ["office@0", "office@x", "loop@2", "offices:5:x", "offices:99999", "gone.toml"]
+    "name", ["office@0", "office#x", "office@x", "loop@2", "offices:5:x", "offices:99999", "gone.toml"]
 )
 def test_bad_names_are_refused(name):
     with pytest.raises(BadWorld):
@@ -156,3 +157,21 @@ def test_rooms_and_doors_beside_a_map_become_its_ground_truth(tmp_path):
     (tmp_path / "locations.yaml").write_text("locations: [a, b]\npolygons: []\n")
     with pytest.raises(BadWorld, match=r"locations\.yaml: locations and polygons do not fit"):
         worlds.load(tmp_path / "m.yaml")
+
+
+def test_described_things_can_stand_in_a_ros_map(tmp_path):
+    grey = np.full((60, 120), 254, dtype=np.uint8)
+    grey[0] = grey[-1] = grey[:, 0] = grey[:, -1] = 0
+    (tmp_path / "m.pgm").write_bytes(b"P5\n120 60\n255\n" + grey.tobytes())
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n")
+    (tmp_path / "w.toml").write_text(
+        'name = "w"\nmap = "m.yaml"\n[[furniture]]\nkind = "sofa"\nat = [4.0, 2.3, 0.0]\n'
+        "[[person]]\npoints = [[1, 1], [5, 1]]\n"
+    )
+    world = worlds.load(tmp_path / "w.toml")
+    assert len(world.boxes) == 5
+    assert len(world.movers) == 1
+    assert world.raster.occupied[world.raster.cell(4.0, 2.3)]
+    (tmp_path / "w.toml").write_text('name = "w"\nmap = "gone.yaml"\n')
+    with pytest.raises(BadWorld, match=r"gone\.yaml: no such file"):
+        worlds.load(tmp_path / "w.toml")

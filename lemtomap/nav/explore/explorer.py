@@ -1,8 +1,9 @@
 """Exploration: goal after goal at unexplored openings, until none is left; says what stayed closed."""
 
 import heapq
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -19,6 +20,15 @@ from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent
 from lemtomap.topo.graph import OpeningState, Placeholder
 from lemtomap.types import MapView, RouteGraph
+
+
+@runtime_checkable
+class RemembersOpenings(Protocol):
+    """A graph on file that keeps the openings of earlier drives."""
+
+    def openings(self) -> Sequence[Placeholder]:
+        """Return them all, explored and closed ones too."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +64,13 @@ class Explorer:
         self,
         config: ExploreConfig | None = None,
         nav: NavConfig | None = None,
-        known: Iterable[Placeholder] = (),
     ) -> None:
         self.config = config or ExploreConfig()
         self._nav = nav or NavConfig()
         self._costmap = Costmap(self._nav.costmap, self._nav.body)
         self._memory = SeenMemory()
-        self._openings = Openings(known)
+        self._openings = Openings()
+        self._recalled = False
         self._pursuit: _Pursuit | None = None
         self._looked_s = -np.inf
         self._empty_looks = 0
@@ -81,6 +91,9 @@ class Explorer:
         if self._output.done or map_view.lost or now_s - self._looked_s < self.config.period_s - 1e-6:
             return ExploreOutput(None, self._output.done, self._output.text, *self._lists())
         self._looked_s = now_s
+        if not self._recalled and isinstance(graph, RemembersOpenings):
+            self._openings.recall(graph.openings())
+        self._recalled = True
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
         reach = self._look(map_view, T_grid_base)
         self._judge(navigation, now_s)

@@ -30,10 +30,17 @@ class _Kept:
 class Openings:
     """All placeholders, and the events that keep the topological map's copy up to date."""
 
-    def __init__(self, known: Iterable[Placeholder] = ()) -> None:
-        self._kept = {p.placeholder_id: _Kept(p, p) for p in known if p.state != OpeningState.EXPLORED}
-        self._next_id = 1 + max(self._kept, default=0)
+    def __init__(self) -> None:
+        self._kept: dict[int, _Kept] = {}
+        self._next_id = 1
         self._events: list[NavEvent] = []
+
+    def recall(self, known: Iterable[Placeholder]) -> None:
+        """Take over what the map remembers; IDs count on from there."""
+        for placeholder in known:
+            self._next_id = max(self._next_id, placeholder.placeholder_id + 1)
+            if placeholder.state != OpeningState.EXPLORED:
+                self._kept[placeholder.placeholder_id] = _Kept(placeholder, placeholder)
 
     def take_events(self) -> list[NavEvent]:
         """Return what the map is to be told since the last call."""

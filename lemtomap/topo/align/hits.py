@@ -17,25 +17,31 @@ CELL_M = 0.05
 LEAST_HITS = 2.0  # one hit alone may be a mixed pixel at an edge
 EVERY_M = 0.1  # a scan taken from nearly the same place tells nothing new
 EVERY_RAD = 0.1
+RECENT_M = 10.0  # of way: so far a window SLAM hardly drifts, and older hits may stand beside newer ones
 
 
 class HitMap:
     """Mean hit of each cell, in the grid frame."""
 
-    def __init__(self, size_m: float = 24.0) -> None:
+    def __init__(self, size_m: float = 24.0, recent_m: float = RECENT_M) -> None:
         cells = round(size_m / CELL_M)
         self._owner = np.full((cells, cells, 2), np.iinfo(np.int32).min, np.int32)
-        self._sums = np.zeros((cells, cells, 3))
+        self._sums = np.zeros((cells, cells, 4))
+        self._recent_m = recent_m
+        self._way_m = 0.0
         self._last: Pose | None = None
 
     def add(self, T_grid_base: Pose, points_base: NDArray[np.floating]) -> None:
         """Take in a scan's hits, float (N, 2), metres, base frame, when the robot has moved a little."""
         if self._last is not None:
             dx, dy, turn = (T_grid_base - self._last).tolist()
-            if math.hypot(dx, dy) < EVERY_M and 1.0 - math.cos(turn) < 0.5 * EVERY_RAD**2:
+            step_m = math.hypot(dx, dy)
+            if step_m < EVERY_M and 1.0 - math.cos(turn) < 0.5 * EVERY_RAD**2:
                 return
+            self._way_m += step_m
         self._last = np.array(T_grid_base)
-        kernels.add_hits(transform(T_grid_base, points_base), CELL_M, self._owner, self._sums)
+        points = transform(T_grid_base, points_base)
+        kernels.add_hits(points, CELL_M, self._owner, self._sums, self._way_m, self._recent_m)
 
     def around(
         self, centre_m: tuple[float, float], radius_m: float, grid: GridView, occupied_from: int
@@ -54,6 +60,7 @@ class HitMap:
             *centre_m,
             radius_m,
             LEAST_HITS,
+            self._way_m - self._recent_m,
             grid.occupancy,
             *window,
             occupied_from,

@@ -13,10 +13,11 @@ Cells = NDArray[np.int8]
 
 
 @njit(nogil=True, cache=True)
-def add_hits(points: Values, cell: float, owner: Indices, sums: Values) -> None:
-    """Add grid-frame points to a ring of cells: owner (S, S, 2) is whose cell it is, sums (S, S, 3) x, y, n.
+def add_hits(points: Values, cell: float, owner: Indices, sums: Values, now: float, recent: float) -> None:
+    """Add grid-frame points to a ring of cells: owner (S, S, 2) is whose cell it is, sums (S, S, 4) x, y, n
+    and when it was hit last, in metres of way like `now`.
 
-    A cell that last belonged to another place of the building starts anew.
+    A cell that last belonged to another place of the building, or was hit too long ago, starts anew.
     """
     size = owner.shape[0]
     for k in range(points.shape[0]):
@@ -25,7 +26,7 @@ def add_hits(points: Values, cell: float, owner: Indices, sums: Values) -> None:
             continue
         col, row = math.floor(x / cell), math.floor(y / cell)
         r, c = row % size, col % size
-        if owner[r, c, 0] != row or owner[r, c, 1] != col:
+        if owner[r, c, 0] != row or owner[r, c, 1] != col or now - sums[r, c, 3] > recent:
             owner[r, c, 0], owner[r, c, 1] = row, col
             sums[r, c, :] = 0.0
         if sums[r, c, 2] > 100.0:  # the mean goes on following a wall that moved
@@ -33,6 +34,7 @@ def add_hits(points: Values, cell: float, owner: Indices, sums: Values) -> None:
         sums[r, c, 0] += x
         sums[r, c, 1] += y
         sums[r, c, 2] += 1.0
+        sums[r, c, 3] = now
 
 
 @njit(nogil=True, cache=True)
@@ -44,13 +46,14 @@ def collect_hits(
     centre_y: float,
     radius: float,
     least: float,
+    since: float,
     occupancy: Cells,
     resolution: float,
     origin_x: float,
     origin_y: float,
     occupied_from: int,
 ) -> Values:
-    """Return the mean hits within a square around a centre that the window still believes, float64 (N, 2)."""
+    """Return the mean hits in a square, newer than `since`, that the window believes, float64 (N, 2)."""
     size = owner.shape[0]
     rows, cols = occupancy.shape
     reach = min(math.ceil(radius / cell), size // 2 - 1)
@@ -61,6 +64,8 @@ def collect_hits(
         for col in range(col0 - reach, col0 + reach + 1):
             r, c = row % size, col % size
             if owner[r, c, 0] != row or owner[r, c, 1] != col or sums[r, c, 2] < least:
+                continue
+            if sums[r, c, 3] < since:
                 continue
             x, y = sums[r, c, 0] / sums[r, c, 2], sums[r, c, 1] / sums[r, c, 2]
             i, j = math.floor((y - origin_y) / resolution), math.floor((x - origin_x) / resolution)

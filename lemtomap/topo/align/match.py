@@ -28,6 +28,7 @@ class MatchConfig:
     gate_sigmas: float = 4.0  # from the prediction, Mahalanobis
     sigma_m: float = 0.05  # scatter of boundary points about hits: half a coding cell
     coarse_sigma_m: float = 0.15  # for the search: as wide as its step
+    weak_axis: float = 0.1  # a direction with less of the strongest one's information tells nothing
     points_per_look: float = 8.0  # neighbouring points err together; so many count as one
     apart_m: float = 0.35  # poses further apart than this are rivals in the search
     rival_share: float = 0.93  # a rival with this share of the best fit makes the search undecided
@@ -138,6 +139,8 @@ def _refined(
             pose=pose,
             sigma=config.sigma_m,
         )
+        sees = _seen_axes(seen, config.weak_axis)
+        seen, g = sees @ seen @ sees, sees @ g
         scatter_sq = max(error / max(weight, 1.0), (0.4 * config.sigma_m) ** 2) * config.points_per_look
         H = seen / scatter_sq + prior
         off = pose - prior_pose
@@ -149,6 +152,19 @@ def _refined(
     turn = adjoint(np.array([0.0, 0.0, -pose[2]]))
     pose[2] = wrap_angle(pose[2])
     return pose, np.asarray(turn @ np.linalg.inv(H) @ turn.T)
+
+
+def _seen_axes(information: Covariance, weak_axis: float) -> Covariance:
+    """Return the projection, float64 (3, 3), that leaves out the way along a corridor.
+
+    Walls are never quite straight, so a corridor seems to say a little about the way along it; it does not
+    (thesis, appendix D).
+    """
+    values, axes = np.linalg.eigh(information[:2, :2])
+    keep = np.eye(3)
+    if values[0] < weak_axis * values[1]:
+        keep[:2, :2] -= np.outer(axes[:, 0], axes[:, 0])
+    return keep
 
 
 def _doubts(

@@ -6,6 +6,7 @@ import pytest
 from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.navigator import Navigator
 from lemtomap.topo.events import OpeningDone, OpeningSeen
+from lemtomap.topo.graph import OpeningState, Placeholder
 from tests.lemtomap.nav.world import RES, Graph, World
 
 
@@ -60,3 +61,26 @@ def test_explores_the_whole_office_and_ends_by_itself(window_m):
     born = {event.placeholder_id for event in events if isinstance(event, OpeningSeen)}
     gone = {event.placeholder_id for event in events if isinstance(event, OpeningDone)}
     assert born == gone
+
+
+class Remembering(Graph):
+    """A graph on file with an opening from an earlier drive."""
+
+    def openings(self):
+        return [
+            Placeholder(7, 1, 6.0, 0.5, 0.0, 0.8),
+            Placeholder(9, 1, 3.0, 0.0, 0.0, 0.8, OpeningState.EXPLORED),
+        ]
+
+
+def test_goes_on_where_an_earlier_drive_left_off():
+    world = office()
+    world.graph = Remembering(world.graph.places, world.graph.links)
+    world.known[:] = True
+    world.known[:, round(6.0 / RES) :] = False
+    explorer = Explorer()
+    wish = explorer.step(world.view(), world.graph, None, world.T_odom_base, world.now_s)
+    numbers = {opening.placeholder_id for opening in wish.openings}
+    assert 7 in numbers
+    assert 9 not in numbers
+    assert min(numbers - {7}, default=10) >= 10

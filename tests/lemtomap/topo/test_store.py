@@ -4,12 +4,15 @@ import sqlite3
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lemtomap.errors import BadMap
+from lemtomap.nav.config import RouteConfig
+from lemtomap.nav.route.network import RouteNetwork
 from lemtomap.topo.graph import Edge, Place
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
@@ -145,6 +148,26 @@ def test_a_reader_follows_the_writer_and_forgets_only_what_changed(tmp_path):
             assert reader.version != version
             assert reader.edges_of(2)[0].blocked_until_s == 30.0
             assert reader.edges_of(3) is kept
+
+
+def test_an_undriven_closure_is_no_short_cut_until_someone_has_driven_it(tmp_path):
+    """A closure may pass through a wall: it is dearer than a way round of up to several times its length."""
+    path = tmp_path / "a.lemto"
+    with TopoStore.create(path) as store:
+        for _ in range(4):
+            store.add_node()
+        for a in (1, 2, 3):
+            store.add_edge(an_edge(a, a + 1))
+        closure = store.add_edge(an_edge(1, 4, type=EdgeType.LOOP_CLOSING))
+        store.commit()
+        with TopoReader(path) as reader:
+            network = RouteNetwork(reader.edge_table(), RouteConfig())
+            assert network.plan(1, 4, 0.0).nodes == (1, 2, 3, 4)
+            assert max(edge.time_s for edge in reader.edges_of(1)) == closure.expected_time_s
+            store.put_edge(replace(closure, time_s=2.5))
+            store.commit()
+            network = RouteNetwork(reader.edge_table(), RouteConfig())
+            assert network.plan(1, 4, 0.0).nodes == (1, 4)
 
 
 WRITER = """

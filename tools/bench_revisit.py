@@ -1,0 +1,159 @@
+"""How true the topological map is where the robot has been before: a simulated drive against ground truth.
+
+    python tools/bench_revisit.py [--world office | plan.yaml | plan.yaml@4] [--metres 40] [--seeds 3]
+
+The robot drives to a place and back, twice (the thesis' errand), with slipping wheels, a biased gyro and
+a noisy laser; loop closing is off. For every scan: how far is the associated node from where it truly is, as
+seen from the robot? Is it the nearest node in sight? Does a near-neighbour edge cross a wall? Truth is used
+here only to judge.
+"""
+
+import argparse
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.grid import SlamConfig, WindowMatcher
+from lemtomap.se2 import Pose, between, compose
+from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.store import TopoStore
+from lemtomap.types import EdgeType
+from robot.logs import open_log
+from sim import worlds
+from sim.carmen import record_tour
+from sim.simulator import Simulator
+from sim.tours import plan_errand
+from sim.world import Raster, World
+
+RIGHT_WITHIN_M = 0.3  # association has a margin: a node this little further than the nearest is right too
+
+
+@dataclass
+class Findings:
+    """What one drive showed."""
+
+    off_m: list[float] = field(default_factory=list)
+    off_rad: list[float] = field(default_factory=list)
+    right: list[bool] = field(default_factory=list)
+    measured: list[bool] = field(default_factory=list)
+    crossing: int = 0
+    near: int = 0
+    nodes: int = 0
+    map_bytes: int = 0
+    place_bytes: float = 0.0
+    cpu_s: float = 0.0
+    driven_s: float = 0.0
+
+
+def truths(log: Path) -> NDArray[np.float64]:
+    """Return T_world_base of each scan, float64 (N, 3), from the TRUEPOS lines of a simulated log."""
+    rows = [line.split()[1:4] for line in log.read_text().splitlines() if line.startswith("TRUEPOS")]
+    return np.array(rows, dtype=np.float64)
+
+
+def drive(world: World, metres: float, seed: int, folder: Path, config: TopoConfig) -> Findings:
+    """Simulate, map and judge one errand."""
+    log = folder / f"errand{seed}.log"
+    record_tour(Simulator(world, seed=seed), plan_errand(world, metres), log)
+    truth = truths(log)
+    slam = WindowMatcher(SlamConfig(), seed)
+    mapper = TopoMapper(config, TopoStore.create(folder / f"errand{seed}.lemto", durable=False))
+    found = Findings()
+    born: dict[int, Pose] = {}
+    view = None
+    for at, (odometry, scan) in zip(truth, open_log(log), strict=True):
+        update = slam.update(scan, odometry)
+        if view is None or update.integrated:
+            view = slam.view()
+        start = time.thread_time()
+        mapper.update(update, view, slam.points_base())
+        found.cpu_s += time.thread_time() - start
+        found.driven_s = scan.stamp_s
+        born.setdefault(mapper.associated_id, at)  # a new node's frame is where the robot is
+        _judge(found, mapper, at, born, world.raster)
+    found.near, found.crossing = _walls_crossed(mapper, born, world.raster)
+    found.nodes = mapper.store.count("node")
+    sizes = [len(place.boundary) + len(place.descriptor) for _, place in mapper.store.places()]
+    found.place_bytes = float(np.mean(sizes))
+    mapper.close()
+    found.map_bytes = mapper.store.path.stat().st_size
+    return found
+
+
+def _judge(found: Findings, mapper: TopoMapper, at: Pose, born: dict[int, Pose], raster: Raster) -> None:
+    node_id = mapper.associated_id
+    off = between(compose(at, between([0.0, 0.0, 0.0], _seen(mapper, node_id))), born[node_id])
+    found.off_m.append(float(np.hypot(off[0], off[1])))
+    found.off_rad.append(abs(float(off[2])))
+    found.measured.append(mapper.transform.measured)
+    gap_m = {i: float(np.hypot(*(T[:2] - at[:2]))) for i, T in born.items()}
+    nearest_m = min(m for i, m in gap_m.items() if i == node_id or not crosses(raster, at, born[i]))
+    found.right.append(gap_m[node_id] <= nearest_m + RIGHT_WITHIN_M)
+
+
+def _seen(mapper: TopoMapper, node_id: int) -> Pose:
+    """Return T_base_node as the map has it."""
+    return between(mapper.now[0].T_grid_base, mapper.local.standings[node_id].T_grid_node)
+
+
+def _walls_crossed(mapper: TopoMapper, born: dict[int, Pose], raster: Raster) -> tuple[int, int]:
+    near = [edge for edge in mapper.store.edges() if edge.type is EdgeType.NEAR_NEIGHBOUR]
+    return len(near), sum(crosses(raster, born[edge.source_id], born[edge.target_id]) for edge in near)
+
+
+def crosses(raster: Raster, a: Pose, b: Pose) -> bool:
+    """Tell whether a wall of the true plan lies on the straight line between two places."""
+    steps = max(2, int(np.hypot(*(b[:2] - a[:2])) / (0.4 * raster.resolution_m)))
+    points = a[:2] + np.linspace(0.0, 1.0, steps)[:, None] * (b[:2] - a[:2])
+    cols, rows = np.floor((points - np.array(raster.origin_m)) / raster.resolution_m).astype(int).T
+    return bool(raster.occupied[rows, cols].any())
+
+
+def report(found: list[Findings]) -> None:
+    """Print the figures of all drives together."""
+    off_m, off_rad = (np.concatenate([getattr(f, name) for f in found]) for name in ("off_m", "off_rad"))
+    right = np.concatenate([f.right for f in found])
+    measured = np.concatenate([f.measured for f in found])
+    turn = np.rad2deg(off_rad)
+    print(f"scans {len(off_m)}, nodes {[f.nodes for f in found]}")
+    print(f"associated node, metres off: median {np.median(off_m):.3f}  p99 {np.percentile(off_m, 99):.3f}")
+    print(f"associated node, degrees off: median {np.median(turn):.2f}  p99 {np.percentile(turn, 99):.2f}")
+    print(f"right associated node {right.mean():.2%}; transform measured {measured.mean():.2%}")
+    print(
+        f"near-neighbour edges {sum(f.near for f in found)}, through a wall {sum(f.crossing for f in found)}"
+    )
+    print(f"localisation data {np.mean([f.place_bytes for f in found]):.0f} bytes a node")
+    cpu = sum(f.cpu_s for f in found) / sum(f.driven_s for f in found)
+    print(f"map {[f.map_bytes for f in found]} bytes; topological part {cpu:.2%} of one core in real time")
+
+
+def main() -> None:
+    """Run the drives and print what they showed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--world", default="office")
+    parser.add_argument("--metres", type=float, default=40.0)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--node-distance", type=float, default=1.0)
+    args = parser.parse_args()
+    world = worlds.load(args.world)
+    config = TopoConfig(new_node_distance_m=args.node_distance)
+    pgm_bytes = world.raster.occupied.size
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(args.seeds):
+            found.append(drive(world, args.metres, seed, Path(folder), config))
+            print(f"seed {seed}: p99 {np.percentile(found[-1].off_m, 99):.3f} m", file=sys.stderr, flush=True)
+    report(found)
+    worst = max(f.map_bytes for f in found)
+    share = worst / pgm_bytes
+    print(f"the whole plan as PGM: {pgm_bytes} bytes; the map takes {share:.1%} of that")
+
+
+if __name__ == "__main__":
+    main()
