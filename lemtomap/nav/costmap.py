@@ -62,7 +62,8 @@ class Costs:
 class LiveLayer:
     """Obstacles one sensor saw lately, with the time each was last seen."""
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
+    def __init__(self, shape: tuple[int, ...], decay_s: float) -> None:
+        self.decay_s = decay_s
         self.last_hit_s = np.full(shape, -np.inf)
         self.hits = np.zeros(shape, dtype=np.uint8)
 
@@ -99,7 +100,7 @@ class Costmap:
         grid = self._grid
         if grid is None:
             return
-        layer = self._live.setdefault(sighting.source, LiveLayer(grid.occupancy.shape))
+        layer = self._layer(sighting, grid)
         T_grid_base = se2.compose(T_grid_odom, sighting.T_odom_base)
         origin = np.asarray(sighting.origin_base)
         rays = np.concatenate([sighting.hits_base, sighting.misses_base]) - origin
@@ -109,10 +110,21 @@ class Costmap:
         scale = np.where(near, 1.0, reach / np.maximum(length, 1e-9))
         ends = self._cells(se2.transform(T_grid_base, origin + rays * scale[:, None]))
         start = self._cells(se2.transform(T_grid_base, origin[None, :]))[0]
-        if sighting.misses_base.size or sighting.hits_base.size:
+        if sighting.floor_base is not None:
+            floor = self._cells(se2.transform(T_grid_base, sighting.floor_base))
+            kernels.clear_cells(layer.last_hit_s, layer.hits, floor[:, 0], floor[:, 1])
+        elif len(rays):
             kernels.clear_rays(layer.last_hit_s, layer.hits, start[0], start[1], ends[:, 0], ends[:, 1], 1.5)
         marks = ends[: len(sighting.hits_base)][near[: len(sighting.hits_base)]]
         kernels.mark_hits(layer.last_hit_s, layer.hits, marks[:, 0], marks[:, 1], sighting.stamp_s)
+
+    def _layer(self, sighting: Sighting, grid: GridView) -> LiveLayer:
+        layer = self._live.get(sighting.source)
+        flat = sighting.floor_base is None
+        decay_s = self._config.live_decay_s if flat else self._config.depth_decay_s
+        if layer is None:
+            layer = self._live[sighting.source] = LiveLayer(grid.occupancy.shape, decay_s)
+        return layer
 
     def hold(self, p_grid: ArrayLike, radius_m: float, until_s: float) -> None:
         """Let live obstacles within a radius be believed until then, unless rays clear them before."""
@@ -121,7 +133,7 @@ class Costmap:
             rows, cols = np.nonzero(layer.hits)
             away = np.hypot(rows + 0.5 - row, cols + 0.5 - col) * self._resolution_m
             close = away <= radius_m
-            layer.last_hit_s[rows[close], cols[close]] = until_s - self._config.live_decay_s
+            layer.last_hit_s[rows[close], cols[close]] = until_s - layer.decay_s
 
     def forget_live(self) -> None:
         """Drop all live obstacles: the next scans tell anew."""
@@ -135,9 +147,7 @@ class Costmap:
         state = np.empty(grid.occupancy.shape, dtype=np.uint8)
         kernels.classify(grid.occupancy, config.occupied_percent, state)
         for layer in self._live.values():
-            kernels.add_live(
-                state, layer.last_hit_s, layer.hits, now_s, config.live_decay_s, config.live_hits
-            )
+            kernels.add_live(state, layer.last_hit_s, layer.hits, now_s, layer.decay_s, config.live_hits)
         res = grid.resolution_m
         for row, col in self._cells(hazards_grid):
             kernels.stamp_disc(state, row, col, config.contact_radius_m / res, kernels.LETHAL)

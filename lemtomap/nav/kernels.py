@@ -53,6 +53,17 @@ def clear_rays(
 
 
 @njit(nogil=True, cache=True)
+def clear_cells(last_hit_s: F8, hits: U1, rows: F8, cols: F8) -> None:
+    """Forget live obstacles in the cells of these points."""
+    height, width = last_hit_s.shape
+    for i in range(rows.size):
+        r, c = int(np.floor(rows[i])), int(np.floor(cols[i]))
+        if r >= 0 and c >= 0 and r < height and c < width:
+            hits[r, c] = 0
+            last_hit_s[r, c] = -np.inf
+
+
+@njit(nogil=True, cache=True)
 def mark_hits(last_hit_s: F8, hits: U1, rows: F8, cols: F8, now_s: float) -> None:
     """Count one hit per cell and scan."""
     height, width = last_hit_s.shape

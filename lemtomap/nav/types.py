@@ -14,6 +14,14 @@ from lemtomap.types import Scan, Twist
 Points = NDArray[np.float64]
 """float64 (N, 2), metres."""
 
+FLOOR_M = 0.025
+"""A depth camera's floor is rough by this much near by, and by FLOOR_SLOPE more per metre of distance."""
+FLOOR_SLOPE = 0.012
+ROBOT_HEIGHT_M = 0.45
+"""TurtleBot 2 with its plates: 0.42 m."""
+BODY_M = 0.25
+"""Nearer points are the robot itself."""
+
 
 @dataclass(frozen=True, slots=True)
 class Goal:
@@ -89,6 +97,9 @@ class Sighting:
     """Where the rays start, base frame."""
     source: str = "laser"
     """Each source has its own obstacle layer: a laser ray never clears what a depth camera saw."""
+    floor_base: Points | None = None
+    """float64 (K, 2): places where bare floor was seen. A camera looks over a low obstacle at the floor
+    behind it, so its rays clear nothing on their way, only where they end on the floor."""
 
     @classmethod
     def from_scan(cls, scan: Scan, T_odom_base: Pose, source: str = "laser") -> "Sighting":
@@ -107,6 +118,22 @@ class Sighting:
             origin_base=(float(origin[0]), float(origin[1])),
             source=source,
         )
+
+    @classmethod
+    def from_cloud(
+        cls, stamp_s: float, T_odom_base: Pose, cloud_base: NDArray[np.floating], source: str = "depth"
+    ) -> "Sighting":
+        """Take points (N, 3) of a depth camera, metres, base frame with z above the floor.
+
+        What the robot would run into stands between FLOOR_M and its own height; what is lower is floor.
+        """
+        cloud = np.asarray(cloud_base, dtype=np.float64).reshape(-1, 3)
+        cloud = cloud[np.isfinite(cloud).all(axis=1)]
+        away_m, z_m = np.hypot(cloud[:, 0], cloud[:, 1]), cloud[:, 2]
+        floor = z_m < FLOOR_M + FLOOR_SLOPE * away_m
+        solid = ~floor & (z_m < ROBOT_HEIGHT_M) & (away_m > BODY_M)
+        none = np.empty((0, 2))
+        return cls(stamp_s, T_odom_base, cloud[solid, :2], none, source=source, floor_base=cloud[floor, :2])
 
     @classmethod
     def from_points(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lemtomap.nav.navigator import Navigator
-from lemtomap.nav.types import NavState, Reason
+from lemtomap.nav.types import NavState, Reason, Sighting
 from lemtomap.topo.events import Bumped, EdgeBlocked
 from tests.lemtomap.nav.test_navigator import two_rooms
 from tests.lemtomap.nav.world import run
@@ -118,6 +118,26 @@ def test_never_bumps_twice_into_what_the_laser_overlooks():
     assert sum(isinstance(e, Bumped) for o in outputs for e in o.events) == world.contacts == 1
     assert drive_blind(world, navigator, 1, 90.0)[-1].state == NavState.ARRIVED
     assert world.contacts == 1
+
+
+def test_a_depth_camera_keeps_it_off_what_the_laser_overlooks():
+    world = two_rooms()
+    world.hidden[18:23, 70:75] = True
+    world.hidden[30:36, 100:104] = True
+    navigator = Navigator()
+    navigator.set_goal(6, world.now_s)
+    output = None
+    for _ in range(600):
+        seen = [world.sighting(), Sighting.from_cloud(world.now_s, world.T_odom_base, world.cloud())]
+        output = navigator.step(
+            world.view(), world.graph, world.T_odom_base, world.twist, seen, (), world.now_s
+        )
+        if navigator.goal is None:
+            break
+        world.drive(output.twist)
+    assert output is not None
+    assert output.state == NavState.ARRIVED
+    assert world.contacts == 0
 
 
 def test_gives_up_in_bounded_time_when_the_wheels_spin():
