@@ -12,7 +12,7 @@ import argparse
 import sys
 import tempfile
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
+from robot.bridge import URG_SILENT_FREE_M
 from robot.logs import open_log
 from sim import worlds
 from sim.carmen import record_tour
@@ -68,6 +69,7 @@ def drive(world: World, metres: float, seed: int, folder: Path, config: TopoConf
     born: dict[int, Pose] = {}
     view = None
     for at, (odometry, scan) in zip(truth, open_log(log), strict=True):
+        scan = replace(scan, silent_free_m=URG_SILENT_FREE_M)  # noqa: PLW2901 - as on the robot
         update = slam.update(scan, odometry)
         if view is None or update.integrated:
             view = slam.view()

@@ -291,12 +291,18 @@ def explained(
     resolution: float,
     origin_x: float,
     origin_y: float,
+    occupied_from: int,
 ) -> tuple[int, int]:
-    """Return (points the window knows about, those of them with a target within `within` metres)."""
+    """Return (points the window knows about, those of them that are there).
+
+    A point is there when a target or an occupied cell lies within `within` metres: what was seen once from
+    afar has too few hits for a target. A point in a free cell with nothing near contradicts.
+    """
     size = field.shape[0]
     rows, cols = occupancy.shape
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     known, near = 0, 0
+    reach = math.floor(within / resolution)
     for k in range(points.shape[0]):
         x = pose[0] + cos * points[k, 0] - sin * points[k, 1]
         y = pose[1] + sin * points[k, 0] + cos * points[k, 1]
@@ -310,4 +316,16 @@ def explained(
                 continue
         if 0 <= i < rows and 0 <= j < cols and occupancy[i, j] >= 0:
             known += 1
+            near += occupied_near(occupancy, i, j, reach, occupied_from)
     return known, near
+
+
+@njit(nogil=True, cache=True)
+def occupied_near(occupancy: Cells, row: int, col: int, reach: int, occupied_from: int) -> int:
+    """Return 1 when an occupied cell lies within `reach` cells, else 0."""
+    rows, cols = occupancy.shape
+    for r in range(max(row - reach, 0), min(row + reach + 1, rows)):
+        for c in range(max(col - reach, 0), min(col + reach + 1, cols)):
+            if (r - row) ** 2 + (c - col) ** 2 <= reach * reach and occupancy[r, c] >= occupied_from:
+                return 1
+    return 0

@@ -25,6 +25,7 @@ class MatchConfig:
     least_share: float = 0.3  # and the share of the place's points these must be
     least_score: float = 0.6  # share of them that has a hit within `near_m`
     near_m: float = 0.12  # two coding cells' half widths
+    occupied_from: int = 50  # occupancy of GridView that counts as a wall
     gate_sigmas: float = 4.0  # from the prediction, Mahalanobis
     sigma_m: float = 0.05  # scatter of boundary points about hits: half a coding cell
     coarse_sigma_m: float = 0.15  # for the search: as wide as its step
@@ -84,7 +85,9 @@ def match_place(
     coarse = _searched(boundary, field, start, covariance, config)
     T_grid_node, posterior = _refined(boundary, field, coarse, predicted, config)
     window = (grid.occupancy, grid.resolution_m, *grid.origin_m)
-    known, near = kernels.explained(boundary.points, *field.plan, T_grid_node, config.near_m, *window)
+    known, near = kernels.explained(
+        boundary.points, *field.plan, T_grid_node, config.near_m, *window, config.occupied_from
+    )
     score = near / max(1, known)
     refused = _doubts(between(start, T_grid_node), covariance, known, score, len(boundary.points), config)
     if refused:
