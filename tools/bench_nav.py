@@ -305,7 +305,7 @@ def topological(world: World, seed: int, folder: Path) -> Legs:
     core = build_core(RobotConfig(), folder / f"topo{seed}.lemto", durable=False, seed=seed)
     meters = Meter(), Meter()
     navigator = core.navigation.navigator
-    routes = navigator._routes  # noqa: SLF001 - measured from outside on purpose
+    routes = navigator._way._planner  # noqa: SLF001 - measured from outside on purpose
     routes.plan = meters[0].timed(routes.plan)  # type: ignore[method-assign]
     navigator.step = meters[1].timed(navigator.step)  # type: ignore[method-assign]
     legs = Legs("topological", seed, simulator, meters)

@@ -6,7 +6,7 @@
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,12 @@ from lemtomap.errors import NoRoute
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.costmap import Costs
 from lemtomap.nav.follower import Follower, Motion, Step
-from lemtomap.nav.metric import MetricPlan, Reach, plan_to, reach_from
+from lemtomap.nav.metric import MetricPlan, plan_to, reach_from
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
 from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.route.planning import RoutePlanner
-from lemtomap.nav.sliding import BORDER_M, Target, choose_target, find_barrier, find_detour, place_of
+from lemtomap.nav.sliding import Target, choose_target, place_of
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
     Contact,
@@ -33,29 +32,15 @@ from lemtomap.nav.types import (
     Reason,
     Sighting,
 )
-from lemtomap.nav.watching import BarrierWatch, EdgeClock, Link, links_cut, links_open_again
+from lemtomap.nav.watching import EdgeClock
+from lemtomap.nav.way import Moment, WayKeeper
 from lemtomap.se2 import Pose
-from lemtomap.topo.events import EdgeBlocked, NavEvent
 from lemtomap.types import MapView, RouteGraph, Twist
 
-NEAR_BARRIER_M = 1.0
 BUMP_BACK_M = 0.15
 AT_NODE_M = 0.5
 STAYED_M = 0.4
 REST = Twist(0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class _Moment:
-    """What one control cycle knows."""
-
-    map_view: MapView
-    graph: RouteGraph
-    T_odom_base: Pose
-    T_grid_base: Pose
-    twist: Twist
-    now_s: float
-    events: list[NavEvent] = field(default_factory=list)
 
 
 class Navigator:
@@ -69,10 +54,7 @@ class Navigator:
         self._costmap_view: CostmapView | None = None
         self._goal: Goal | None = None
         self._end: tuple[NavState, Reason, str] = (NavState.IDLE, Reason.NONE, "no goal")
-        self._routes = RoutePlanner(self.config.route)
-        self._route: Route | None = None
-        self._route_version: int | None = None
-        self._closed: dict[int, float] = {}
+        self._way = WayKeeper(self.config)
         self._plan: MetricPlan | None = None
         self._target: Target | None = None
         self._planned_s = -np.inf
@@ -85,7 +67,6 @@ class Navigator:
         self._progress = ProgressWatch(self.config.recovery)
         self._ladder = Ladder(self.config.recovery)
         self._way_back = WayBack()
-        self._barriers = BarrierWatch(self.config.recovery)
         self._edge_clock = EdgeClock()
 
     @property
@@ -101,7 +82,7 @@ class Navigator:
         """
         stayed = self._goal is not None and self._way_back.stayed_m < STAYED_M
         self._goal = Goal(goal) if isinstance(goal, int) else goal
-        self._route, self._plan, self._target = None, None, None
+        self._way.route, self._plan, self._target = None, None, None
         self._waiting_s = self._lost_s = self._shut_since_s = None
         self._planned_s = -np.inf
         self._follower.restart()
@@ -109,7 +90,7 @@ class Navigator:
             self._progress.move_goal()
             return
         self._way_back.start_leg()
-        self._barriers.reset()
+        self._way.barriers.reset()
         self._ladder.reset()
         self._progress.restart(now_s)
 
@@ -137,7 +118,7 @@ class Navigator:
         self._cycle += 1
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
         speed = REST if bumps else self._speed(twist)  # a bump has stopped the robot, or must
-        moment = _Moment(map_view, graph, T_odom_base, T_grid_base, speed, now_s)
+        moment = Moment(map_view, graph, T_odom_base, T_grid_base, speed, now_s)
         self._way_back.drove(T_odom_base)
         self.surroundings.recall(graph, now_s)
         self.surroundings.take(map_view, _as_sightings(scan_points_base, T_odom_base, now_s))
@@ -158,7 +139,7 @@ class Navigator:
             self._command.w_radps if steady else measured.w_radps,
         )
 
-    def _feel(self, bumps: Sequence[Contact], moment: _Moment) -> None:
+    def _feel(self, bumps: Sequence[Contact], moment: Moment) -> None:
         """Remember contacts and leave them backwards."""
         for contact in bumps:
             moment.events.append(self.surroundings.touch(contact, moment.map_view, moment.T_grid_base))
@@ -168,63 +149,56 @@ class Navigator:
 
     # ---- one cycle with a goal ----
 
-    def _act(self, moment: _Moment) -> NavOutput:
+    def _act(self, moment: Moment) -> NavOutput:
         if moment.map_view.lost:
             return self._wait_for_pose(moment)
         self._lost_s = None
+        goal = self._goal
+        if goal is None:
+            return self._rest(moment)
         try:
-            route = self._keep_route(moment)
+            route = self._way.keep(goal, moment)
         except NoRoute as error:
             return self._fail(moment, Reason.NO_ROUTE, str(error))
         if moment.now_s - self._planned_s >= self.config.plan_period_s - 1e-6 or self._plan is None:
-            self._replan(route, moment)
-            if self._route is None:  # an edge was closed: look for another way at once
+            self._replan(goal, route, moment)
+            if self._way.route is None:  # an edge was closed: look for another way at once
                 return self._act(moment)
-            route = self._route
         if self._goal_is_shut(route, moment):
             return self._fail(moment, Reason.BLOCKED, f"the goal is out of reach from node {route.nodes[-1]}")
         recovering = self._recover_step(moment)
         return self._go(route, moment) if recovering is None else recovering
 
-    def _go(self, route: Route, moment: _Moment) -> NavOutput:
+    def _go(self, route: Route, moment: Moment) -> NavOutput:
         if self._plan is None or self._target is None:
             return self._no_way(route, moment)
         self._waiting_s = None
         return self._drive(route, self._plan, self._target, moment)
 
-    def _keep_route(self, moment: _Moment) -> Route:
-        """Return the route from the associated node, planned anew only when the map or the way changed."""
-        goal, graph, here = self._goal, moment.graph, moment.map_view.associated_id
-        if goal is None:
-            raise RuntimeError("no goal")
-        route = self._route
-        if route is not None and self._route_version == graph.version and here in route.nodes:
-            self._route = route.since(here)
-            return self._route
-        self._closed = {edge: until for edge, until in self._closed.items() if until > moment.now_s}
-        route = self._routes.plan(graph, moment.map_view, goal.node_id, moment.now_s, self._closed)
-        self._route, self._route_version = route, graph.version
-        return route
-
-    def _replan(self, route: Route, moment: _Moment) -> None:
+    def _replan(self, goal: Goal, route: Route, moment: Moment) -> None:
         """Renew costmap, reachable part, sliding goal and the field towards it."""
-        goal, view = self._goal, moment.map_view
-        if goal is None:
-            return
+        view = moment.map_view
         self._planned_s = moment.now_s
         self.costs = costs = self.surroundings.costs(view, moment.T_grid_base, moment.now_s)
         self._costmap_view = costs.view()
         reach = reach_from(costs, moment.T_grid_base)
-        self._barriers.remember(self.surroundings.hits_grid(view.T_grid_odom), moment.now_s)
-        tolerance = goal.tolerance_m or self.config.goal_tolerance_m
-        self._target = choose_target(route, goal, view.T_grid_node, reach, tolerance)
+        tolerance_m = self._tolerance_m()
+        self._target = choose_target(route, goal, view.T_grid_node, reach, tolerance_m)
         self._plan = None
         if self._target is not None:
             self._plan = plan_to(costs, moment.T_grid_base, self._target.cell)
-        self._reopen(reach, moment)
-        self._check_barrier(route, reach, moment)
+        self._way.barriers.remember(self.surroundings.hits_grid(view.T_grid_odom), moment.now_s)
+        shut_at = self._way.check(goal, self._target, self._plan, reach, moment)
+        if shut_at is not None:
+            self.surroundings.hold(shut_at, moment.now_s + self.config.recovery.block_s)
+            self._start_over(moment.now_s)
 
-    def _goal_is_shut(self, route: Route, moment: _Moment) -> bool:
+    def _start_over(self, now_s: float) -> None:
+        """The way is another one now: what was measured along the old one no longer counts."""
+        self._plan, self._target, self._waiting_s = None, None, None
+        self._progress.restart(now_s)
+
+    def _goal_is_shut(self, route: Route, moment: Moment) -> bool:
         """Tell whether the robot has stood at the goal's node for a while with no way to the goal itself."""
         target, at_node = self._target, False
         if target is not None and not target.final and target.index == len(route.nodes) - 1:
@@ -237,45 +211,9 @@ class Navigator:
         since_s = self._shut_since_s
         return since_s is not None and moment.now_s - since_s > self.config.recovery.closed_after_s
 
-    def _reopen(self, reach: Reach, moment: _Moment) -> None:
-        for edge_id, a, b in links_open_again(self._closed, moment.map_view, reach):
-            del self._closed[edge_id]
-            moment.events.append(EdgeBlocked(a, b, 0.0))
-
-    def _check_barrier(self, route: Route, reach: Reach, moment: _Moment) -> None:
-        """Close the edges a standing barrier cuts, once it is to be believed."""
-        goal, places = self._goal, moment.map_view.T_grid_node
-        if goal is None:
-            return
-        beyond = 0 if self._target is None else self._target.index
-        barrier = find_barrier(route, places, reach, beyond)
-        if barrier is None and self._plan is not None:
-            way_m = np.inf if self._barriers.watching else self._plan.length_m
-            barrier = find_detour(route, goal, places, reach.costs, beyond, way_m)
-        if barrier is None:
-            self._barriers.reset()
-            return
-        away_m = float(np.hypot(*(np.array(barrier.p_near_grid) - moment.T_grid_base[:2])))
-        near = away_m < NEAR_BARRIER_M or self._target is None
-        if self._barriers.closed(barrier, moment.now_s, near=near):
-            on_route = _link(route, barrier.index)
-            self._close([on_route, *links_cut(moment.map_view, reach, BORDER_M)], moment)
-            self.surroundings.hold(barrier.p_middle_grid, moment.now_s + self.config.recovery.block_s)
-
-    def _close(self, links: Sequence[Link], moment: _Moment) -> None:
-        """Plan around these edges from now on, and tell the map."""
-        until_s = moment.now_s + self.config.recovery.block_s
-        for edge_id, a, b in {link[0]: link for link in links}.values():
-            self._closed[edge_id] = until_s
-            moment.events.append(EdgeBlocked(a, b, until_s))
-        self._route, self._plan, self._target = None, None, None
-        self._waiting_s = None
-        self._barriers.reset()
-        self._progress.restart(moment.now_s)
-
     # ---- driving ----
 
-    def _drive(self, route: Route, plan: MetricPlan, target: Target, moment: _Moment) -> NavOutput:
+    def _drive(self, route: Route, plan: MetricPlan, target: Target, moment: Moment) -> NavOutput:
         end_m = self._way_to_end(plan, moment.T_grid_base) if target.final else None
         if end_m is not None and self._follower.at_goal(end_m, self._tolerance_m()):
             step = self._follower.halt(moment.T_grid_base, moment.twist, self._goal_yaw(route, moment))
@@ -290,7 +228,7 @@ class Navigator:
         self._ladder.relax(self._progress.take_gain())
         return self._send(route, plan, target, step, moment)
 
-    def _send(self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: _Moment) -> NavOutput:
+    def _send(self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: Moment) -> NavOutput:
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
         twist = limit_twist(step.twist, points, self.config.body)
         state = NavState.TURNING if step.motion == Motion.TURN else NavState.DRIVING
@@ -315,7 +253,7 @@ class Navigator:
         goal = self._goal
         return self.config.goal_tolerance_m if goal is None or goal.tolerance_m is None else goal.tolerance_m
 
-    def _goal_yaw(self, route: Route, moment: _Moment) -> float | None:
+    def _goal_yaw(self, route: Route, moment: Moment) -> float | None:
         goal = self._goal
         if goal is None or goal.yaw_node_rad is None:
             return None
@@ -324,7 +262,7 @@ class Navigator:
 
     # ---- when it does not work ----
 
-    def _no_way(self, route: Route, moment: _Moment) -> NavOutput:
+    def _no_way(self, route: Route, moment: Moment) -> NavOutput:
         """Nothing of the route can be reached: wait a little, then climb the ladder."""
         if self._waiting_s is None:
             self._waiting_s = moment.now_s
@@ -336,7 +274,7 @@ class Navigator:
         self._waiting_s = moment.now_s
         return self._climb(moment)
 
-    def _climb(self, moment: _Moment) -> NavOutput:
+    def _climb(self, moment: Moment) -> NavOutput:
         """Take the next rung of the ladder, or give up with the reason."""
         if self._ladder.exhausted:
             return self._fail(moment, Reason.BLOCKED, "no progress after every recovery")
@@ -345,14 +283,14 @@ class Navigator:
         self._planned_s = -np.inf
         if rung == Rung.CLEAR:
             self.surroundings.forget_live()
-        if rung == Rung.BLOCK and self._route is not None and self._route.edges:
-            self._close([_link(self._route, 0)], moment)
+        if rung == Rung.BLOCK and self._way.close_next(moment):
+            self._start_over(moment.now_s)
         twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
         return self._output(
             moment, twist, NavState.RECOVERING, Reason.OBSTACLE, f"no progress: {rung.name.lower()}"
         )
 
-    def _recover_step(self, moment: _Moment) -> NavOutput | None:
+    def _recover_step(self, moment: Moment) -> NavOutput | None:
         wanted = self._ladder.step(
             moment.T_odom_base, self._way_back, moment.now_s, room_behind=self._room_behind(moment)
         )
@@ -365,7 +303,7 @@ class Navigator:
         twist = limit_twist(twist, points, self.config.body)
         return self._output(moment, twist, NavState.RECOVERING, Reason.OBSTACLE, name)
 
-    def _room_behind(self, moment: _Moment) -> bool:
+    def _room_behind(self, moment: Moment) -> bool:
         """Tell whether the costmap leaves room 10 cm behind the robot."""
         if self.costs is None:
             return True
@@ -378,7 +316,7 @@ class Navigator:
         there, here = clear[int(row), int(col)], clear[int(here_row), int(here_col)]
         return bool(there * self.costs.resolution_m >= self.config.body.radius_m or there > here)
 
-    def _wait_for_pose(self, moment: _Moment) -> NavOutput:
+    def _wait_for_pose(self, moment: Moment) -> NavOutput:
         if self._lost_s is None:
             self._lost_s = moment.now_s
         if moment.now_s - self._lost_s > self.config.recovery.lost_patience_s:
@@ -387,7 +325,7 @@ class Navigator:
         twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
         return self._output(moment, twist, NavState.WAITING, Reason.LOST, "pose lost: waiting for it")
 
-    def _fail(self, moment: _Moment, reason: Reason, text: str) -> NavOutput:
+    def _fail(self, moment: Moment, reason: Reason, text: str) -> NavOutput:
         self._finish(NavState.FAILED, reason, text)
         return self._rest(moment)
 
@@ -395,14 +333,14 @@ class Navigator:
 
     def _finish(self, state: NavState, reason: Reason, text: str) -> None:
         self._end = (state, reason, text)
-        self._goal = self._route = self._plan = self._target = None
+        self._goal = self._way.route = self._plan = self._target = None
 
-    def _rest(self, moment: _Moment) -> NavOutput:
+    def _rest(self, moment: Moment) -> NavOutput:
         slower = approach(moment.twist, REST, self.config.body, self.config.period_s)
         return self._output(moment, slower, *self._end)
 
-    def _output(self, moment: _Moment, twist: Twist, state: NavState, reason: Reason, text: str) -> NavOutput:
-        plan, target = self._plan, self._target
+    def _output(self, moment: Moment, twist: Twist, state: NavState, reason: Reason, text: str) -> NavOutput:
+        plan, target, way = self._plan, self._target, self._way.route
         return NavOutput(
             stamp_s=moment.now_s,
             twist=twist,
@@ -410,15 +348,11 @@ class Navigator:
             reason=reason,
             text=text,
             goal=self._goal,
-            route=() if self._route is None else self._route.nodes,
+            route=() if way is None else way.nodes,
             target_id=None if target is None else target.node_id,
             local_path_grid=np.empty((0, 2)) if plan is None else plan.path_grid,
             costmap=self._costmap_view,
         )
-
-
-def _link(route: Route, index: int) -> Link:
-    return route.edges[index].edge_id, route.nodes[index], route.nodes[index + 1]
 
 
 def _as_sightings(

@@ -1,0 +1,105 @@
+"""The route under way: planned, kept while it holds, and planned around edges that prove closed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lemtomap.nav.config import NavConfig
+from lemtomap.nav.metric import MetricPlan, Reach
+from lemtomap.nav.route.planner import Route
+from lemtomap.nav.route.planning import RoutePlanner
+from lemtomap.nav.sliding import BORDER_M, Target, find_barrier, find_detour
+from lemtomap.nav.types import Goal
+from lemtomap.nav.watching import BarrierWatch, Link, links_cut, links_open_again
+from lemtomap.se2 import Pose
+from lemtomap.topo.events import EdgeBlocked, NavEvent
+from lemtomap.types import MapView, RouteGraph, Twist
+
+NEAR_BARRIER_M = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What one control cycle knows."""
+
+    map_view: MapView
+    graph: RouteGraph
+    T_odom_base: Pose
+    T_grid_base: Pose
+    twist: Twist
+    now_s: float
+    events: list[NavEvent] = field(default_factory=list)
+
+
+class WayKeeper:
+    """Holds the route to one goal and which edges are closed; closed edges outlive the goal."""
+
+    def __init__(self, config: NavConfig) -> None:
+        self._config = config
+        self._planner = RoutePlanner(config.route)
+        self._version: int | None = None
+        self._closed_s: dict[int, float] = {}
+        self.route: Route | None = None
+        """None: to be planned anew."""
+        self.barriers = BarrierWatch(config.recovery)
+
+    def keep(self, goal: Goal, moment: Moment) -> Route:
+        """Return the route from the associated node, planned anew only when the map or the way changed.
+
+        Raises NoRoute with the reason.
+        """
+        graph, here = moment.graph, moment.map_view.associated_id
+        if self.route is not None and self._version == graph.version and here in self.route.nodes:
+            self.route = self.route.since(here)
+            return self.route
+        self._closed_s = {edge: until for edge, until in self._closed_s.items() if until > moment.now_s}
+        self.route = self._planner.plan(graph, moment.map_view, goal.node_id, moment.now_s, self._closed_s)
+        self._version = graph.version
+        return self.route
+
+    def check(
+        self, goal: Goal, target: Target | None, plan: MetricPlan | None, reach: Reach, moment: Moment
+    ) -> tuple[float, float] | None:
+        """Open edges seen to be free; close those a standing barrier cuts, once it is to be believed.
+
+        Returns where that barrier stands, in the grid frame; the route is then to be planned anew.
+        """
+        for edge_id, a, b in links_open_again(self._closed_s, moment.map_view, reach):
+            del self._closed_s[edge_id]
+            moment.events.append(EdgeBlocked(a, b, 0.0))
+        route, places = self.route, moment.map_view.T_grid_node
+        if route is None:
+            return None
+        beyond = 0 if target is None else target.index
+        barrier = find_barrier(route, places, reach, beyond)
+        if barrier is None and plan is not None:
+            way_m = np.inf if self.barriers.watching else plan.length_m
+            barrier = find_detour(route, goal, places, reach.costs, beyond, way_m)
+        if barrier is None:
+            self.barriers.reset()
+            return None
+        away_m = float(np.hypot(*(np.array(barrier.p_near_grid) - moment.T_grid_base[:2])))
+        near = away_m < NEAR_BARRIER_M or target is None
+        if not self.barriers.closed(barrier, moment.now_s, near=near):
+            return None
+        on_route = (barrier.edge_id, route.nodes[barrier.index], route.nodes[barrier.index + 1])
+        self._close([on_route, *links_cut(moment.map_view, reach, BORDER_M)], moment)
+        return barrier.p_middle_grid
+
+    def close_next(self, moment: Moment) -> bool:
+        """Close the first edge of the route; False when there is none."""
+        route = self.route
+        if route is None or not route.edges:
+            return False
+        self._close([(route.edges[0].edge_id, route.nodes[0], route.nodes[1])], moment)
+        return True
+
+    def _close(self, links: Sequence[Link], moment: Moment) -> None:
+        """Plan around these edges from now on, and tell the map."""
+        until_s = moment.now_s + self._config.recovery.block_s
+        for edge_id, a, b in {link[0]: link for link in links}.values():
+            self._closed_s[edge_id] = until_s
+            moment.events.append(EdgeBlocked(a, b, until_s))
+        self.route = None
+        self.barriers.reset()
