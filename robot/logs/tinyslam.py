@@ -26,6 +26,7 @@ LASER_AHEAD_M = 0.145
 FIRST_ERROR_FREE_MM = 20
 RANGE_MAX_M = 5.6
 ANGLE_STEP_RAD = 2.0 * math.pi / 1024.0  # URG-04LX data sheet: 0.36 degrees
+TURN_S = 0.1  # URG-04LX data sheet: 100 ms a turn of 1024 steps
 ANGLE_MIN_RAD = -(RANGES - 1) / 2.0 * ANGLE_STEP_RAD
 
 
@@ -34,6 +35,9 @@ class _Record:
     stamp_s: float
     ranges_m: NDArray[np.float32]
     T_odom_base: NDArray[np.float64]
+    v_mps: float
+    w_radps: float
+    """Mean velocity since the scan before; the rover drives up to 0.9 m/s, so a scan must be de-skewed."""
 
 
 class TinySlamLog:
@@ -49,30 +53,31 @@ class TinySlamLog:
 
     def __iter__(self) -> Iterator[tuple[Odometry, Scan]]:
         for record in self._records:
-            yield Odometry(record.stamp_s, record.T_odom_base), _scan(record)
+            yield Odometry(record.stamp_s, record.T_odom_base, record.v_mps, record.w_radps), _scan(record)
 
 
 def read(path: Path, lines: list[str]) -> TinySlamLog:
     """Read every line; raises BadLog at the first that is damaged."""
     records: list[_Record] = []
     ticks_before: tuple[float, float] | None = None
-    T_odom_base = se2.pose(0.0, 0.0, 0.0)
+    T_odom_base, step = se2.pose(0.0, 0.0, 0.0), se2.pose(0.0, 0.0, 0.0)
     for number, line in enumerate(lines, start=1):
         fields = line.split()
         if not fields:
             continue
         if len(fields) < FIELDS:
             raise BadLog(f"{path}:{number}: cut in the middle of the line? {len(fields)} fields of {FIELDS}")
-        (stamp_us,) = finite(path, number, fields[:1])
+        stamp_s = finite(path, number, fields[:1])[0] / 1e6
         left, right = finite(path, number, fields[2:4])
         millimetres = np.array(finite(path, number, fields[FIRST_RANGE : FIRST_RANGE + RANGES]))
         if ticks_before is not None:
-            T_odom_base = se2.compose(
-                T_odom_base, _wheel_step(left - ticks_before[0], right - ticks_before[1])
-            )
+            step = _wheel_step(left - ticks_before[0], right - ticks_before[1])
+            T_odom_base = se2.compose(T_odom_base, step)
         ticks_before = (left, right)
+        since_s = max(stamp_s - records[-1].stamp_s, TURN_S / 2.0) if records else TURN_S
         ranges = np.where(millimetres < FIRST_ERROR_FREE_MM, np.nan, millimetres / 1000.0).astype(np.float32)
-        records.append(_Record(stamp_us / 1e6, ranges, T_odom_base))
+        v_mps, w_radps = float(step[0]) / since_s, float(step[2]) / since_s
+        records.append(_Record(stamp_s, ranges, T_odom_base, v_mps, w_radps))
     return TinySlamLog(path, records)
 
 
@@ -90,6 +95,7 @@ def _scan(record: _Record) -> Scan:
         ranges_m=record.ranges_m,
         angle_min_rad=ANGLE_MIN_RAD,
         angle_step_rad=ANGLE_STEP_RAD,
+        time_step_s=TURN_S / 1024.0,
         range_max_m=RANGE_MAX_M,
         T_base_laser=se2.pose(LASER_AHEAD_M, 0.0, 0.0),
     )
