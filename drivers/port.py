@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import fcntl
+import os
 from typing import Final, Protocol
 
 import serial
@@ -71,6 +72,8 @@ class SerialPort(asyncio.Protocol):
         self.path = path
         self._transport: SerialTransport | None = None
         self._received = bytearray()
+        self._waiting = bytearray()
+        self._sent = asyncio.Event()
         self._news = asyncio.Event()
         self._made = asyncio.Event()
         self._lost = asyncio.Event()
@@ -103,25 +106,19 @@ class SerialPort(asyncio.Protocol):
         return data
 
     def write(self, data: bytes) -> None:
-        """Send bytes without waiting. Raises PortBroken (also when the device takes no more), PortClosed."""
+        """Send bytes without waiting. Raises PortBroken (also when the device takes no more), PortClosed.
+
+        Goes past pyserial, whose write spins for ever on a device that takes nothing.
+        """
         if self._failure is not None:
             raise self._failure
-        transport = self._transport
-        if transport is None or transport.is_closing():
-            raise PortClosed(f"{self.path}: closed")
-        waiting = transport.get_write_buffer_size()
-        if waiting + len(data) > _WAITING_LIMIT:
-            self._break(f"the device takes no more bytes ({waiting} wait)")
-            raise PortBroken(f"{self.path}: the device takes no more bytes")
-        try:
-            sent = 0 if waiting else self._device().write(data) or 0
-        except BlockingIOError:
-            sent = 0
-        except OSError as error:
-            self._break(str(error))
-            raise PortBroken(f"{self.path}: {error}") from error
-        if sent < len(data):
-            transport.write(data[sent:])
+        self._waiting += data
+        if len(self._waiting) == len(data):
+            self._push()
+        if len(self._waiting) > _WAITING_LIMIT:
+            self._break(f"the device takes no more bytes ({len(self._waiting)} wait)")
+        if self._failure is not None:
+            raise self._failure
 
     async def aclose(self) -> None:
         """Send what waits, for at most half a second, and close. Closing twice is fine."""
@@ -130,12 +127,36 @@ class SerialPort(asyncio.Protocol):
         self._news.set()
         if self._transport is None:
             return
-        self._transport.close()
-        try:
+        if self._waiting:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._sent.wait(), _CLOSE_TIMEOUT_S)
+        self._hang_up()
+        with contextlib.suppress(TimeoutError):  # the kernel may hold a stalled device longer than we care
             await asyncio.wait_for(self._lost.wait(), _CLOSE_TIMEOUT_S)
-        except TimeoutError:
-            self._transport.abort()
-            await self._lost.wait()
+
+    def _push(self) -> None:
+        """Hand the kernel what it takes; come back when it takes more."""
+        loop, number = asyncio.get_running_loop(), self._device().fileno()
+        try:
+            sent = os.write(number, self._waiting)
+        except BlockingIOError:
+            sent = 0
+        except OSError as error:
+            self._break(str(error))
+            return
+        del self._waiting[:sent]
+        if self._waiting:
+            self._sent.clear()
+            loop.add_writer(number, self._push)
+        else:
+            self._sent.set()
+            loop.remove_writer(number)
+
+    def _hang_up(self) -> None:
+        transport = self._transport
+        if transport is not None and not transport.is_closing():
+            asyncio.get_running_loop().remove_writer(self._device().fileno())
+            transport.abort()  # closes without pyserial's drain; the kernel still sends what it has
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Asyncio's word that the port is open."""
@@ -157,10 +178,10 @@ class SerialPort(asyncio.Protocol):
         self._lost.set()
 
     def _break(self, reason: str) -> None:
-        self._failure = PortBroken(f"{self.path}: {reason}")
+        if self._failure is None:
+            self._failure = PortBroken(f"{self.path}: {reason}")
         self._news.set()
-        if self._transport is not None:
-            self._transport.abort()
+        self._hang_up()
 
     def _device(self) -> serial.Serial:
         device = self._transport.serial if self._transport is not None else None

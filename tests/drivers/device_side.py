@@ -10,12 +10,14 @@ def kobuki_frame(payload):
     return b"\xaa\x55" + body + bytes([functools.reduce(operator.xor, body)])
 
 
-def kobuki_feedback(index=0, *, bumper=0, left=0, right=0, yaw_cdeg=0, extras=b"", stamp_ms=None):
+def kobuki_feedback(
+    index=0, *, bumper=0, left=0, right=0, yaw_cdeg=0, extras=b"", stamp_ms=None, flags=(0, 0, 0, 0)
+):
     """One packet in the order real robots send, every part of it consistent from index to index."""
     stamp = (20 * index if stamp_ms is None else stamp_ms) & 0xFFFF
-    basic = struct.pack(
-        "<HBBBHHbbBBBB", stamp, bumper, 0, 0, left & 0xFFFF, right & 0xFFFF, 0, 0, 0, 0, 165, 0
-    )
+    drop, cliff, buttons, over = flags
+    ticks = (left & 0xFFFF, right & 0xFFFF)
+    basic = struct.pack("<HBBBHHbbBBBB", stamp, bumper, drop, cliff, *ticks, 0, 0, buttons, 0, 165, over)
     gyro = struct.pack("<BB6h", 2 * index & 0xFF, 6, *([0] * 6))
     return kobuki_frame(
         b"\x01\x0f" + basic

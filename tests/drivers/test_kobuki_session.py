@@ -9,11 +9,15 @@ from drivers.kobuki.commands import Led, Tune
 from drivers.kobuki.events import (
     BaseInfo,
     BumperEvent,
+    ButtonEvent,
+    CliffEvent,
     Compatibility,
     GainsReport,
     KobukiSample,
     LinkDown,
     LinkUp,
+    OverCurrentEvent,
+    WheelDropEvent,
     WrongDeviceSeen,
 )
 from drivers.kobuki.identity import judge_firmware
@@ -68,6 +72,21 @@ def test_a_bump_shorter_than_a_step_is_an_event_all_the_same():
     bumps = [(event.side, event.pressed) for event in of(events, BumperEvent)]
     assert bumps == [(Bumper.CENTER, True), (Bumper.LEFT, True), (Bumper.CENTER, False), (Bumper.LEFT, False)]
     assert of(events, KobukiSample)[5].contact
+
+
+def test_every_contact_button_and_motor_flag_makes_one_event_for_each_change():
+    frames = [kobuki_feedback(i, flags=(2, 4, 1, 2) if 3 <= i < 6 else (0, 0, 0, 0)) for i in range(9)]
+    events, _ = stream(KobukiSession(), frames)
+    assert [(e.side, e.dropped) for e in of(events, WheelDropEvent)] == [(2, True), (2, False)]
+    assert [(e.side, e.seen, e.adc) for e in of(events, CliffEvent)] == [(4, True, 1790), (4, False, 1790)]
+    assert [(e.button, e.pressed) for e in of(events, ButtonEvent)] == [(1, True), (1, False)]
+    assert [(e.side, e.above) for e in of(events, OverCurrentEvent)] == [(2, True), (2, False)]
+    assert [sample.contact for sample in of(events, KobukiSample)] == [False] * 3 + [True] * 3 + [False] * 3
+
+
+def test_a_stranger_is_an_unknown_device():
+    (seen,) = of(KobukiSession().receive(b"$GPRMC,081836,A,3751.65,S,14507.36,E" * 12, 0.0), WrongDeviceSeen)
+    assert "not a Kobuki base but an unknown device answers, it sent '$GPRMC,081836,A,3751.65," in seen.reason
 
 
 def test_versions_are_asked_for_until_they_come_and_gains_only_of_firmware_that_has_them():
