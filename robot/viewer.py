@@ -6,6 +6,7 @@ scan and particles. Each kind of thing has its own rate limit, so a long run sta
 viewer thread never falls behind. The only importer of `rerun`.
 """
 
+import sys
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -71,8 +72,7 @@ class Viewer:
         self._truth: TruthView | None = None
         self._stream = rr.RecordingStream("lemtomap", make_default=False)
         sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(recording))]
-        if live:
-            rr.spawn(connect=False, memory_limit=self._config.memory_limit, hide_welcome_screen=True)
+        if live and self._open_window():
             sinks.append(rr.GrpcSink())
         self._stream.set_sinks(*sinks, default_blueprint=blueprint())
         self._log_static()
@@ -164,6 +164,22 @@ class Viewer:
         """Finish the recording; later calls do nothing useful."""
         self._stream.flush()
         self._stream.disconnect()
+
+    def _open_window(self) -> bool:
+        """Open the live viewer; tell whether it is there. A run goes on without it."""
+        beside = Path(sys.executable).with_name("rerun")  # an environment need not be on PATH
+        try:
+            rr.spawn(
+                connect=False,
+                memory_limit=self._config.memory_limit,
+                hide_welcome_screen=True,
+                executable_path=str(beside) if beside.exists() else None,
+                recording=self._stream,
+            )
+        except (RuntimeError, ValueError, OSError) as error:
+            sys.stderr.write(f"no live view: {error}\n")
+            return False
+        return True
 
     def _at(self, now_s: float) -> None:
         """Stamp what follows with run time."""
