@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from device_side import Urg, kobuki_feedback, scip_status
+from device_side import II, PP, Urg, kobuki_feedback, scip_fields, scip_status
 
 from drivers.hokuyo.events import (
     LaserDown,
@@ -247,6 +247,45 @@ def test_refused_view_is_named_with_the_sensors_code():
     bench.run(2.0)
     fault = of(bench.events, LaserFault)[0]
     assert (fault.code, "MD0044072501000 is refused" in fault.reason) == ("04", True)
+
+
+def refuse(bench, name, status, times):
+    """Let the sensor refuse a command so often before it obeys."""
+    answer, left = bench.urg._answer, [times]
+
+    def stubborn(line, now_s):
+        if line[: len(name)] == name and left[0] > 0:
+            left[0] -= 1
+            return scip_status(line, status)
+        return answer(line, now_s)
+
+    bench.urg._answer = stubborn
+
+
+REFUSALS = [(b"PP", b"0E", 1), (b"PP", b"0B", 1), (b"II", b"0A", 9), (b"TM0", b"01", 9), (b"TM1", b"04", 9)]
+
+
+@pytest.mark.parametrize(("name", "status", "times"), [*REFUSALS, (b"MD", b"0B", 1)])
+def test_refusals_on_the_way_are_got_over(name, status, times):
+    bench = Bench()
+    refuse(bench, name, status, times)
+    assert of(bench.first_scan(4.0).events, LaserScan)
+    assert not of(bench.events, LaserFault)
+
+
+def test_parameters_that_contradict_one_another_are_a_named_fault():
+    wrong = [(key, "30" if key == "AMAX" else value) for key, value in PP]
+    bench = Bench(Urg(parameters=wrong)).run(1.0)
+    assert "the sensor's parameters contradict one another" in of(bench.events, LaserFault)[0].reason
+
+
+def test_sensor_that_says_it_is_ill_is_reported_and_tried_all_the_same():
+    bench = Bench()
+    well, ill = scip_fields(b"II", II), scip_fields(b"II", [*II[:-1], ("STAT", "Laser unstable")])
+    bench.damage = lambda data: data.replace(well, ill)
+    bench.first_scan()
+    assert of(bench.events, LaserFault)[0].reason == "the laser says of itself: Laser unstable"
+    assert of(bench.events, LaserScan)
 
 
 def test_noise_on_the_line_does_not_stop_it():
