@@ -9,7 +9,7 @@ from lemtomap.grid.gmapping import RollingGmapping
 from lemtomap.grid.growing import GrowingGmapping
 from lemtomap.grid.mapper import WindowMatcher
 from lemtomap.nav.navigator import Navigator
-from lemtomap.topo.loops.recogniser import LoopRecogniser
+from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
@@ -42,7 +42,8 @@ def build_core(
     exchange = Exchange()
     make = TopoStore.open if map_path.exists() else TopoStore.create
     store = make(map_path, durable=durable)
-    mapper = TopoMapper(config.topo, store, recogniser=LoopRecogniser())
+    recogniser = None if slam == "gmapping" else LoopRecogniser()  # a growing grid is too large to search
+    mapper = TopoMapper(config.topo, store, recogniser=recogniser)
     mapping = MappingStep(build_slam(slam, config, seed), mapper, exchange)
     navigation = NavigationStep(Navigator(config.nav), exchange, lambda: TopoReader(map_path))
     return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)

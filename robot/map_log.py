@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lemtomap.grid import GridSlam, GrowingGmapping, RollingGmapping, SlamConfig, WindowMatcher
 from lemtomap.pipeline import Mapper
 from lemtomap.topo.config import TopoConfig
-from lemtomap.topo.loops.recogniser import LoopRecogniser
+from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType, GridView, MapView, Odometry, Scan, SlamUpdate
@@ -103,7 +103,9 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
     with outputs.staged(options.out) as stage:
         slam = _Timed(SLAMS[options.slam](config, options.seed))
         store = TopoStore.create(stage / "map.lemto", durable=False)
-        topo = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
+        # the growing grid closes its own loops and is far too large to search
+        recogniser = None if options.slam == "gmapping" else LoopRecogniser()
+        topo = TopoMapper(TopoConfig(), store, recogniser=recogniser)
         try:
             drive = _drive(log, Mapper(slam, topo), slam, bar)
             final, view = final_map(topo), topo.view()

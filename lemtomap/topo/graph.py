@@ -141,13 +141,21 @@ def chain_covariance(first: Covariance, T_b_c: Pose, second: Covariance) -> Cova
     return np.asarray(carry @ first @ carry.T + second)
 
 
-def measured_alone(posterior: Covariance, prior: Covariance) -> Covariance:
-    """Return the covariance of the measurement that made `posterior` of `prior`; a metre where it told
-    nothing.
+WEAK_AXIS = 0.1  # a direction with less of the strongest one's information tells nothing (thesis, appendix D)
 
-    Information adds up, so the measurement's is the difference; rounding may leave it slightly negative.
+
+def sure_of(information: Covariance) -> Covariance:
+    """Return the covariance of a match from its information, a metre along what it does not really see.
+
+    Walls are never quite straight, so a corridor seems to say a little about the way along it. It does not.
     """
-    values, axes = np.linalg.eigh(np.linalg.inv(posterior) - np.linalg.inv(prior))
+    low, high = np.linalg.eigh(information[:2, :2])[0]
+    if low < WEAK_AXIS * high:
+        along = np.zeros(3)
+        along[:2] = np.linalg.eigh(information[:2, :2])[1][:, 0]
+        keep = np.eye(3) - np.outer(along, along)
+        information = keep @ information @ keep
+    values, axes = np.linalg.eigh(information)
     return np.asarray(axes @ np.diag(1.0 / np.maximum(values, 1.0)) @ axes.T)
 
 

@@ -10,7 +10,7 @@ from lemtomap.se2 import Pose, adjoint, compose, inverse
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import NavEvent
-from lemtomap.topo.graph import Covariance, Edge, chain_covariance, measured_alone
+from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
 from lemtomap.topo.local import EdgePicture, LocalMap, Standing
@@ -245,8 +245,7 @@ class TopoMapper:
             return Transform(measured=False, covariance=standing.covariance, score=0.0, reason="no data")
         if match.refused:
             return Transform(False, standing.covariance, match.score, match.refused)
-        seen = measured_alone(match.covariance, standing.covariance)
-        self.local.anchor(node_id, match.T_grid_node, match.covariance, seen=seen)
+        self.local.anchor(node_id, match.T_grid_node, match.covariance)
         self.keeper.compare(node_id, match)
         return Transform(measured=True, covariance=match.covariance, score=match.score)
 

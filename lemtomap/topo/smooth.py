@@ -6,14 +6,14 @@ node stands still in the window; each stretch is tied to its node as surely as t
 window, and closures join nodes. So an error of one match is spread, not jumped over.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, adjoint, between, compose, inverse
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
-from lemtomap.topo.solve import Problem, solve_whole
+from lemtomap.topo.solve import Problem, solve_whole, straightened
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
 from lemtomap.types import EdgeType
@@ -31,7 +31,7 @@ ROBUST_PHI = 25.0  # ties beyond five sigmas are doubted
 
 @dataclass(frozen=True, slots=True)
 class Smoothed:
-    """Everything in the frame of the first scan."""
+    """Everything in the frame of the first node."""
 
     stamps_s: NDArray[np.float64]
     T_map_base: Pose
@@ -62,6 +62,7 @@ def smooth(store: TopoStore, trail: ScanTrail) -> Smoothed:
     links = [*_track_links(records, starts), *_tie_links(records, starts, index)]
     links += _closure_links([e for e in store.edges() if e.type is EdgeType.LOOP_CLOSING], index)
     poses = _solved(links, _start(records, starts, index))
+    poses = between(poses[index[int(records["node_id"][0])]], poses)
     T_map_base = compose(poses[stretch], between(track[starts][stretch], track))
     return Smoothed(records["stamp_s"].copy(), T_map_base, {n: poses[k] for n, k in index.items()})
 
@@ -105,7 +106,13 @@ def _tie_links(records: NDArray[np.void], starts: NDArray[np.int64], index: dict
 
 def _closure_links(edges: list[Edge], index: dict[int, int]) -> list[_Link]:
     return [
-        _Link(index[e.source_id], index[e.target_id], e.T_source_target, e.covariance + CLOSURE_FLOOR)
+        _Link(
+            index[e.source_id],
+            index[e.target_id],
+            e.T_source_target,
+            e.covariance + CLOSURE_FLOOR,
+            ROBUST_PHI,
+        )
         for e in edges
         if e.source_id in index and e.target_id in index
     ]
@@ -122,12 +129,17 @@ def _start(records: NDArray[np.void], starts: NDArray[np.int64], index: dict[int
 
 
 def _solved(links: list[_Link], start: Pose) -> Pose:
+    """Fit all links; then once more from there, doubting what the rest contradicts.
+
+    Doubting from the start would throw out every true closure of a loop that has drifted.
+    """
     problem = Problem(
         np.array([(link.source, link.target) for link in links], np.int64).reshape(-1, 2),
         np.array([link.T_source_target for link in links], np.float64).reshape(-1, 3),
         np.linalg.inv(np.array([link.covariance for link in links]).reshape(-1, 3, 3)).astype(np.float64),
-        np.array([link.phi for link in links]),
+        np.zeros(len(links)),
     )
     held = np.zeros(len(start), dtype=bool)
     held[0] = True
-    return solve_whole(problem, start, held).poses
+    poses = solve_whole(problem, straightened(problem, start, held), held).poses
+    return solve_whole(replace(problem, phi=np.array([link.phi for link in links])), poses, held).poses

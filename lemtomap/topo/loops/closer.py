@@ -37,6 +37,8 @@ class Situation:
     T_grid_base: Pose
     travelled_m: float
     grid: GridView
+    unsure_m: float
+    """Way since the robot's own node was sure."""
     measured: Container[int]
     """Nodes whose place in this window is sure: born in it, or found in it by a search."""
 
@@ -74,6 +76,8 @@ class _Task:
     situation: Situation
     reference: Reference
     box: SearchBox
+    way_m: float
+    """Way over edges from the node the robot was at."""
     hearing_for: Hypothesis | None = None
     search: Search | None = None
 
@@ -121,7 +125,8 @@ class LoopCloser:
                 continue
             reference = reference or Reference(situation.grid, points_grid, self.config.match)
             self._tried[node_id] = situation.travelled_m
-            self._tasks.append(_Task(node_id, situation, reference, box))
+            way_m = self._way_m(situation.here_id, node_id)
+            self._tasks.append(_Task(node_id, situation, reference, box, way_m))
         while len(self._tasks) > 4 * self.config.hearing:
             self._tasks.popleft()
 
@@ -159,7 +164,7 @@ class LoopCloser:
             if node_id in self._descriptors
             and node_id not in situation.measured
             and situation.travelled_m - self._tried.get(node_id, -np.inf) >= self.config.again_after_m
-            and self._far_over_edges(situation.here_id, node_id)
+            and self._way_m(situation.here_id, node_id) >= gate.least_way_m
         ]
         if not near:
             return []
@@ -170,10 +175,13 @@ class LoopCloser:
         order = np.argsort((unlike / USUAL_UNLIKENESS) ** 2 + doubt, kind="stable")
         return self._spaced([near[i] for i in order], self.config.candidates)
 
-    def _far_over_edges(self, here_id: int, node_id: int) -> bool:
-        """Tell whether a node is no part of the neighbourhood that lies in the window anyway."""
+    def _way_m(self, here_id: int, node_id: int) -> float:
+        """Return the way over edges to a node; a short one means that it lies in the window anyway."""
         seen = None if self._outlook is None else self._outlook.between(here_id, node_id)
-        return seen is not None and seen.way_m >= self.config.gate.least_way_m
+        return 0.0 if seen is None else seen.way_m
+
+    def _far_over_edges(self, task: _Task) -> bool:
+        return task.way_m >= self.config.gate.least_way_m
 
     def _spaced(self, node_ids: list[int], count: int) -> list[int]:
         """Return the first few that are not next to one another."""
@@ -220,7 +228,7 @@ class LoopCloser:
         if seen is None:
             return None
         if situation.here_id not in situation.measured:
-            gate = gate.unsure()
+            gate = gate.unsure(situation.unsure_m)
         T_grid_node = compose(situation.T_grid_here, seen.T_from_node)
         turn = adjoint(np.array([0.0, 0.0, situation.T_grid_here[2]]))
         sigma = np.sqrt(np.diag(turn @ seen.covariance @ turn.T))
@@ -282,9 +290,11 @@ class LoopCloser:
         company = self.places.company(task.node_id)
         explained = match.explained * match.known * (0 if company is None else len(company.points_node))
         return (
-            match.explained >= config.explained
+            match.score >= (config.score if self._far_over_edges(task) else config.slip_score)
+            and match.explained >= config.explained
             and match.contradicted <= config.contradicted
             and match.known >= config.known
+            and match.weakest >= config.weakest
             and match.rival <= config.rival
             and explained >= config.points
         )
@@ -316,7 +326,8 @@ class LoopCloser:
         for node_id in heard:
             box = self._box(situation, node_id)
             if box is not None:
-                self._tasks.append(_Task(node_id, situation, task.reference, box, hypothesis))
+                way_m = self._way_m(situation.here_id, node_id)
+                self._tasks.append(_Task(node_id, situation, task.reference, box, way_m, hypothesis))
         hypothesis.heard = not heard
 
     def _commit(self, hypothesis: Hypothesis) -> list[Closure]:

@@ -16,7 +16,7 @@ class MatchConfig:
     free_below: int = 25  # GridView occupancy that counts as seen free
     levels: int = 6  # pyramid: the coarsest bound covers 2**5 cells = 3.2 m
     angle_reach_m: float = 5.0  # lever arm that sets the angle step: turning by one moves no point a cell
-    least_score: float = 0.38  # of a perfect match; a place two thirds in view scores above 0.5
+    least_score: float = 0.32  # of a perfect match, below which nothing is looked for
     distinct_m: float = 0.6  # a runner-up is another place when it is at least this far away
     distinct_rad: float = 0.3  # ... or turned by this
     heap_blocks: int = 60_000  # 2 MB; a search that needs more is ambiguous and given up
@@ -47,18 +47,18 @@ class GateConfig:
     gate_sigmas: float = 3.0  # 99.7 % of what the graph itself thinks possible
     least_box_m: float = 1.0  # a search is never narrower than this
     least_box_rad: float = 0.15
-    unsure_box_m: float = (
-        2.0  # ... while the robot's own node is only predicted: a window slips along a corridor
-    )
+    unsure_box_m: float = 1.2  # ... while the robot's own node is only predicted
+    slip_m_per_m: float = 0.1  # ... more by this much of the way since: windows slip along corridors
     unsure_box_rad: float = 0.25
     widest_m: float = 9.0  # nor wider than the window
     widest_rad: float = 1.0
     least_way_m: float = 12.0  # nearer places over edges lie in the window already
     reach_m: float = 4.0  # a place this near shares enough of the window
 
-    def unsure(self) -> "GateConfig":
-        """Return the gate for a robot whose own node is only predicted in the window."""
-        return replace(self, least_box_m=self.unsure_box_m, least_box_rad=self.unsure_box_rad)
+    def unsure(self, way_m: float) -> "GateConfig":
+        """Return the gate for a robot whose own node has only been predicted in the window for a way."""
+        half_m = min(self.unsure_box_m + self.slip_m_per_m * way_m, self.widest_m)
+        return replace(self, least_box_m=half_m, least_box_rad=self.unsure_box_rad)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +74,14 @@ class LoopConfig:
     again_after_m: float = 2.0  # travel before a place that did not fit is tried again
     company_m: float = 7.0  # places this near over edges are searched as one
     describe_m: float = 5.0  # half the side of what is compared: a node's localisation data reach as far
-    search_points: int = 240  # a search needs no more; the alignment takes all
-    explained: float = 0.82  # a sighting: least share of known points on obstacles, ...
+    search_points: int = 160  # a search needs no more; the alignment takes all
+    score: float = 0.4  # a sighting: a rival of `rival` times this would have been seen
+    slip_score: float = 0.6  # ... that says the window has slipped along a way known before
+    explained: float = 0.82  # least share of known points on obstacles, ...
     contradicted: float = 0.13  # ... most in free space (true revisits on three logs: 0.08 to 0.12), ...
     known: float = 0.5  # ... least in known space, ...
     rival: float = 0.8  # ... most a different pose may score, ...
+    weakest: float = 0.12  # ... least share of the strongest axis' information on the weakest, ...
     points: int = 60  # ... and least explained: six metres of wall
     sightings: int = 2  # that agree, before a closure is committed
     apart_m: float = 1.5  # travel between sightings that count

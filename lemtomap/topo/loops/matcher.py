@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, pose, wrap_angle
+from lemtomap.topo.graph import sure_of
 from lemtomap.topo.loops import kernels
 from lemtomap.topo.loops.config import MatchConfig
 from lemtomap.types import GridView
@@ -260,8 +261,7 @@ def _covariance(
     cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     variance = max(config.point_sigma_m, residual_m) ** 2 * config.correlation
-    least = np.diag([1.0, 1.0, 1.0])  # a match without points says: within a metre or so
-    return np.asarray(np.linalg.inv(turn.T @ info @ turn / variance + least))
+    return sure_of(turn.T @ info @ turn / variance)
 
 
 def _weakest(info: NDArray[np.float64]) -> float:

@@ -26,6 +26,7 @@ class LoopRecogniser:
         """(edge ID, closure) of all that were committed."""
         self._closer: LoopCloser | None = None
         self._found: dict[int, Pose] = {}
+        self._sure_m = 0.0
         self._waiting: list[tuple[int, bytes]] = []
 
     def describe(self, points_node: NDArray[np.float64]) -> bytes:
@@ -45,6 +46,8 @@ class LoopRecogniser:
         here_id = mapper.associated_id
         standing = mapper.local.standings[here_id]
         measured = frozenset(node_id for node_id in mapper.local.standings if self._stands(mapper, node_id))
+        if here_id in measured:
+            self._sure_m = mapper.travelled_m
         x, y = slam.T_grid_base[:2].tolist()
         situation = Situation(
             here_id,
@@ -53,6 +56,7 @@ class LoopRecogniser:
             slam.T_grid_base,
             mapper.travelled_m,
             grid,
+            mapper.travelled_m - self._sure_m,
             measured,
         )
         points = mapper.keeper.hits.around((x, y), HITS_REACH_M, grid, mapper.config.occupied_from)
