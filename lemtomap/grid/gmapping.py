@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lemtomap.grid import particles
 from lemtomap.grid.config import SlamConfig
-from lemtomap.grid.mapper import Tracker
+from lemtomap.grid.mapper import Tracker, roll_and_integrate
 from lemtomap.grid.matching import Match
 from lemtomap.grid.motion import between, compose, odometry_uncertainty
 from lemtomap.grid.scan import Beams
@@ -66,15 +66,9 @@ class RollingGmapping(Tracker):
             self._move_and_weigh(beams, match)
         for particle in self._particles:
             self._own_window(particle)
-            self._roll_and_integrate(particle.window, beams, particle.T_grid_base)
+            roll_and_integrate(particle.window, beams, particle.T_grid_base)
         self._choose_and_resample()
         return self._particles[self._best].T_grid_base
-
-    def _roll_and_integrate(self, window: Window, beams: Beams, T_grid_base: Pose) -> None:
-        """Shift only when the scan falls outside (thesis 3-4), then integrate."""
-        if not window.holds(beams, T_grid_base):
-            window.shift_to(window.centred_origin(T_grid_base))
-        window.integrate(beams, T_grid_base)
 
     def _move_and_weigh(self, beams: Beams, tracked: Match) -> None:
         """Draw each pose from its proposal and weigh it by how well the scan fits its window (lines 7-16)."""

@@ -30,68 +30,6 @@ PLANE_RATIO = 0.1
 
 
 @njit(nogil=True, cache=True)
-def prepare_scan(
-    ranges: Array,
-    directions: Array,
-    T_base_laser: Array,
-    motion: tuple[float, float, float],
-    limits: tuple[float, float, float],
-    hits: Array,
-    cuts: Array,
-) -> tuple[int, int]:
-    """Turn beams into points in base at the first beam's time; return (number of hits, number of cuts).
-
-    motion: v m/s, w rad/s, s between beams. limits: least range, usable range, and how far a beam that met
-    nothing (+inf) proves free space; a beam that goes beyond the usable range is cut there.
-    directions, hits, cuts: (N, 2).
-    """
-    cos_l, sin_l = math.cos(T_base_laser[2]), math.sin(T_base_laser[2])
-    v, w, time_step = motion[0], motion[1], motion[2]
-    skewed = time_step != 0.0 and (v != 0.0 or w != 0.0)
-    hit_count = cut_count = 0
-    for i in range(ranges.shape[0]):
-        r = ranges[i]
-        if math.isnan(r) or r < limits[0]:
-            continue
-        is_hit = r < limits[1]
-        if not is_hit:
-            r = min(limits[1], limits[2]) if math.isinf(r) else limits[1]
-        lx, ly = r * directions[i, 0], r * directions[i, 1]
-        x = T_base_laser[0] + cos_l * lx - sin_l * ly
-        y = T_base_laser[1] + sin_l * lx + cos_l * ly
-        if skewed:
-            turn, way = w * time_step * i, v * time_step * i
-            c, s = math.cos(turn), math.sin(turn)
-            x, y = (
-                way * math.cos(0.5 * turn) + c * x - s * y,
-                way * math.sin(0.5 * turn) + s * x + c * y,
-            )
-        if is_hit:
-            hits[hit_count, 0], hits[hit_count, 1] = x, y
-            hit_count += 1
-        else:
-            cuts[cut_count, 0], cuts[cut_count, 1] = x, y
-            cut_count += 1
-    return hit_count, cut_count
-
-
-@njit(nogil=True, cache=True)
-def outside(points: Array, pose: Array, origin: Array, n: int, resolution: float) -> bool:
-    """Tell whether the robot or a point falls outside the window."""
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    for i in range(points.shape[0]):
-        x = pose[0] + c * points[i, 0] - s * points[i, 1]
-        y = pose[1] + s * points[i, 0] + c * points[i, 1]
-        col = math.floor(x / resolution) - origin[0]
-        row = math.floor(y / resolution) - origin[1]
-        if col < 0 or row < 0 or col >= n or row >= n:
-            return True
-    col = math.floor(pose[0] / resolution) - origin[0]
-    row = math.floor(pose[1] / resolution) - origin[1]
-    return bool(col < 0 or row < 0 or col >= n or row >= n)
-
-
-@njit(nogil=True, cache=True)
 def _renew_nearest(
     evidence: Array, nearest: Array, offsets: Array, n: int, origin: Array, gx: int, gy: int
 ) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from lemtomap.grid import kernels
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.scan import Beams
+from lemtomap.grid.scan import kernels as scan_kernels
 from lemtomap.se2 import Pose
 from lemtomap.types import GridView
 
@@ -114,7 +115,9 @@ class Window:
         off_x, off_y = T_grid_base[:2] - self.resolution_m * self.arrays.origin - half_m
         if max(abs(off_x), abs(off_y)) > OFF_CENTRE_SHARE * half_m:
             return False
-        return not kernels.outside(beams.hits, T_grid_base, self.arrays.origin, self.cells, self.resolution_m)
+        return not scan_kernels.outside(
+            beams.hits, T_grid_base, self.arrays.origin, self.cells, self.resolution_m
+        )
 
     def centred_origin(self, T_grid_base: Pose) -> tuple[int, int]:
         """Return the origin, cells, that puts the robot in the middle."""

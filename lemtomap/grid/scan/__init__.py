@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.grid import kernels
+from lemtomap.grid.scan import kernels
 from lemtomap.types import Odometry, Scan
 
 
