@@ -17,6 +17,7 @@ CLIFF_SENSORS = ((0.085, -0.13601), (0.156, 0.0), (0.08734, 0.13601))
 """Right, centre, left, metres in base (kobuki_description)."""
 CASTERS = ((0.115, 0.0), (-0.135, 0.0))
 CLIFF_DROP_M = 0.04  # simulation threshold; the robot feels cliffs deeper than 5 cm (section 3.4)
+LEAN_M = 0.05  # between the wheels' floors: more, and the lower wheel hangs
 WHEEL_TRAVEL_M = 0.02  # suspension travel before the switch says dropped
 
 
@@ -198,13 +199,17 @@ class Body:
         expected = [state.height_m + tan_pitch * u for u, _ in CLIFF_SENSORS]
         drops = [level - floor for level, floor in zip(expected, levels[:3], strict=True)]
         self.floor_drops = (drops[0], drops[1], drops[2])
-        self.wheels_hang = (state.height_m - left > WHEEL_TRAVEL_M, state.height_m - right > WHEEL_TRAVEL_M)
-        support = max(left, right, min(front, back))
+        leans = abs(left - right) < LEAN_M  # the body leans onto both wheels
+        lowest = [
+            state.height_m - (abs(left - right) / 2 if leans else 0.0) - level for level in (left, right)
+        ]
+        self.wheels_hang = (lowest[0] > WHEEL_TRAVEL_M, lowest[1] > WHEEL_TRAVEL_M)
+        support = max((left + right) / 2 if leans else max(left, right), min(front, back))
         fall = max(support, state.height_m - 0.02)  # at most 2 m/s down at 100 steps a second
         pitch = 0.0
         if abs(front - back) < 0.25 * (CASTERS[0][0] - CASTERS[1][0]):
             pitch = math.atan2(front - back, CASTERS[0][0] - CASTERS[1][0])
-        roll = math.atan2(left - right, 2 * HALF_TRACK_M) if abs(left - right) < 0.05 else state.roll
+        roll = math.atan2(left - right, 2 * HALF_TRACK_M) if leans else state.roll
         self.state = replace(state, height_m=fall, pitch=pitch, roll=roll)
 
 
