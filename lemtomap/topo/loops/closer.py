@@ -114,6 +114,7 @@ class LoopCloser:
         self._renew_outlook(situation.here_id)
         self.hypotheses.drop_old(situation.travelled_m)
         chosen = self._candidates(situation, points_grid)
+        chosen += self._strangers(situation, points_grid)
         if situation.here_id not in situation.measured and situation.here_id in self._descriptors:
             chosen.insert(0, situation.here_id)
         if not chosen and not self.hypotheses.alive:
@@ -175,10 +176,32 @@ class LoopCloser:
         order = np.argsort((unlike / USUAL_UNLIKENESS) ** 2 + doubt, kind="stable")
         return self._spaced([near[i] for i in order], self.config.candidates)
 
+    def _strangers(self, situation: Situation, points_grid: NDArray[np.float64]) -> list[int]:
+        """Return places of parts of the map that nothing joins to the robot's own, those most alike here.
+
+        So a robot switched on anywhere in a map, or carried elsewhere, finds itself again.
+        """
+        outlook = self._outlook
+        if outlook is None or not outlook.done or len(outlook) >= self.config.gate.outlook_nodes:
+            return []
+        unknown = [node_id for node_id in self._descriptors if node_id not in outlook]
+        if not unknown:
+            return []
+        base = situation.T_grid_base[:2]
+        around = points_grid[np.abs(points_grid - base).max(axis=1) <= self.config.describe_m]
+        unlike = distances(describe(around), np.array([self._descriptors[node_id] for node_id in unknown]))
+        return [unknown[i] for i in np.argsort(unlike, kind="stable")[: self.config.candidates]]
+
+    def _anywhere(self, situation: Situation) -> SearchBox:
+        """Return the box in which a place without any relation to here is searched: all round."""
+        half_m = self.config.stranger_box_m
+        x_m, y_m, _ = situation.T_grid_base.tolist()
+        return SearchBox(np.array([x_m, y_m, 0.0]), half_m, half_m, np.pi)
+
     def _way_m(self, here_id: int, node_id: int) -> float:
         """Return the way over edges to a node; a short one means that it lies in the window anyway."""
         seen = None if self._outlook is None else self._outlook.between(here_id, node_id)
-        return 0.0 if seen is None else seen.way_m
+        return np.inf if seen is None else seen.way_m
 
     def _far_over_edges(self, task: _Task) -> bool:
         return task.way_m >= self.config.gate.least_way_m
@@ -226,7 +249,8 @@ class LoopCloser:
         outlook, gate = self._outlook, self.config.gate
         seen = None if outlook is None else outlook.between(situation.here_id, node_id)
         if seen is None:
-            return None
+            joined = outlook is None or not outlook.done or node_id in outlook
+            return None if joined else self._anywhere(situation)
         if situation.here_id not in situation.measured:
             gate = gate.unsure(situation.unsure_m)
         T_grid_node = compose(situation.T_grid_here, seen.T_from_node)
@@ -270,6 +294,7 @@ class LoopCloser:
                     f"sighting {task.situation.here_id}->{task.node_id} n={len(hypothesis.sightings)} {match}"
                 )
             if len(hypothesis.sightings) == 1:
+                hypothesis.needed = self.config.sightings + int(np.isinf(task.way_m))
                 self._hear(task, hypothesis)
         if task.hearing_for is not None and not any(t.hearing_for is task.hearing_for for t in self._tasks):
             task.hearing_for.heard = True
@@ -323,6 +348,9 @@ class LoopCloser:
                 if node_id not in same and node_id in self._descriptors and node_id not in situation.measured
             ]
             heard = self._spaced(rest, self.config.hearing)
+            if np.isinf(task.way_m):
+                others = self._strangers(situation, task.reference.points_grid)
+                heard += [node_id for node_id in others if node_id not in same]
         for node_id in heard:
             box = self._box(situation, node_id)
             if box is not None:

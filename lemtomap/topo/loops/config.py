@@ -73,6 +73,7 @@ class LoopConfig:
     spacing_m: float = 1.5  # of places heard; a place covers its neighbours
     again_after_m: float = 2.0  # travel before a place that did not fit is tried again
     company_m: float = 7.0  # places this near over edges are searched as one
+    stranger_box_m: float = 5.0  # half the side searched for a place without any relation to here
     describe_m: float = 5.0  # half the side of what is compared: a node's localisation data reach as far
     search_points: int = 160  # a search needs no more; the alignment takes all
     score: float = 0.4  # a sighting: a rival of `rival` times this would have been seen

@@ -42,6 +42,8 @@ class Hypothesis:
     sightings: list[Sighting] = field(default_factory=list)
     heard: bool = False
     """Whether all other places within the gate have been searched too."""
+    needed: int = 2
+    """Sightings it takes; one more where the graph has no say."""
     rejected: int = 0
     """How often the window contradicted it."""
 
@@ -89,7 +91,7 @@ class Hypotheses:
     def certain(self) -> Hypothesis | None:
         """Return a hypothesis with enough support, heard, and without a rival; None when there is none."""
         for hypothesis in self.alive:
-            if not hypothesis.heard or hypothesis.support(self.config) < self.config.sightings:
+            if not hypothesis.heard or hypothesis.support(self.config) < hypothesis.needed:
                 continue
             if hypothesis.rejected == 0 and not any(
                 other is not hypothesis and 2 * len(other.sightings) >= len(hypothesis.sightings)

@@ -101,6 +101,8 @@ class LoopRecogniser:
     def _of(self, mapper: "TopoMapper") -> LoopCloser:
         if self._closer is None:
             self._closer = LoopCloser(self.config, mapper.graph)
+            for node_id, place in mapper.store.places():
+                self._closer.place_taken(node_id, place.descriptor)
             for node_id, descriptor in self._waiting:
                 self._closer.place_taken(node_id, descriptor)
         return self._closer
