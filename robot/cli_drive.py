@@ -34,7 +34,7 @@ def register(app: typer.Typer) -> None:
         app,
         sim,
         "lemtomap sim                                        explore the office, drive to its far end",
-        "lemtomap sim --fast --mission goto:12               lock-step: faster, and the same every time",
+        "lemtomap sim --fast --mission goto:12               lock-step: explore, then go there",
         "lemtomap sim --world plan.yaml --duration 600       any ROS map_server floor plan",
         "lemtomap sim --serve                                only the fake hardware, on two pseudo-terminals",
     )

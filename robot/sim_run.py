@@ -1,6 +1,6 @@
 """`lemtomap sim`: the whole robot in a simulated building, in lock-step or in real time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,8 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
     """Run until the mission is over or the time is up; return the summary. Raises BadWorld, BadSetting."""
     worlds.load(options.world)
     parse_mission(options.mission)
+    if options.mission.startswith("goto:"):  # the map is empty: see the building first
+        options = replace(options, mission=f"explore,{options.mission}")
     plan = RunPlan(
         out=options.out,
         map_path=options.out / "map.lemto",
