@@ -139,8 +139,13 @@ class Costmap:
         """Drop all live obstacles: the next scans tell anew."""
         self._live.clear()
 
-    def build(self, now_s: float, hazards_grid: Points, p_robot_grid: ArrayLike) -> Costs:
-        """Return the costmap of this moment. hazards_grid: float64 (N, 2), metres, what was met by touch."""
+    def build(
+        self, now_s: float, hazards_grid: Points, p_robot_grid: ArrayLike, *, tight: bool = False
+    ) -> Costs:
+        """Return the costmap of this moment. hazards_grid: float64 (N, 2), metres, what was met by touch.
+
+        tight: without the margin, for a place that a few noisy cells make too narrow.
+        """
         grid, config = self._grid, self._config
         if grid is None:
             raise RuntimeError("build before follow_window")
@@ -153,7 +158,7 @@ class Costmap:
             kernels.stamp_disc(state, row, col, config.contact_radius_m / res, kernels.LETHAL)
         reach = (config.inflation_m + self._body.radius_m) / res
         clearance = kernels.clearance_transform(state, reach)
-        body = (self._body.radius_m + config.margin_m) / res
+        body = (self._body.radius_m + (0.0 if tight else config.margin_m)) / res
         cost = kernels.traversal_cost(
             state, clearance, body, config.near_wall_cost, config.falloff_m / res, config.unknown_factor
         )

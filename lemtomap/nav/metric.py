@@ -21,6 +21,10 @@ class Reach:
     level: NDArray[np.uint8]
     """uint8 (rows, cols): 0 no, 1 over seen floor, 2 only over unseen floor."""
 
+    def area_m2(self) -> float:
+        """Return how much floor can be reached."""
+        return float(np.count_nonzero(self.level)) * self.costs.resolution_m**2
+
     def nearest(self, p_grid: ArrayLike, within_m: float) -> tuple[int, int, int] | None:
         """Return (row, col, level) of the best reachable cell within a distance of a point, or None.
 

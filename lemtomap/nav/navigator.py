@@ -16,12 +16,12 @@ from lemtomap.errors import NoRoute
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.costmap import Costs
 from lemtomap.nav.follower import Follower, Motion, Step
-from lemtomap.nav.metric import MetricPlan, plan_to, reach_from
+from lemtomap.nav.metric import MetricPlan, Reach, plan_to, reach_from
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
 from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.sliding import Target, choose_target, place_of
+from lemtomap.nav.sliding import Target, choose_target, find_barrier, place_of
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
     Contact,
@@ -179,11 +179,14 @@ class Navigator:
         """Renew costmap, reachable part, sliding goal and the field towards it."""
         view = moment.map_view
         self._planned_s = moment.now_s
-        self.costs = costs = self.surroundings.costs(view, moment.T_grid_base, moment.now_s)
+        reach, self._target = self._look(goal, route, moment, tight=False)
+        beyond = 0 if self._target is None else self._target.index
+        if self._target is None or find_barrier(route, view.T_grid_node, reach, beyond) is not None:
+            narrow, further = self._look(goal, route, moment, tight=True)
+            if further is not None and (self._target is None or further.index > beyond):
+                reach, self._target = narrow, further
+        self.costs = costs = reach.costs
         self._costmap_view = costs.view()
-        reach = reach_from(costs, moment.T_grid_base)
-        tolerance_m = self._tolerance_m()
-        self._target = choose_target(route, goal, view.T_grid_node, reach, tolerance_m)
         self._plan = None
         if self._target is not None:
             self._plan = plan_to(costs, moment.T_grid_base, self._target.cell)
@@ -192,6 +195,13 @@ class Navigator:
         if shut_at is not None:
             self.surroundings.hold(shut_at, moment.now_s + self.config.recovery.block_s)
             self._start_over(moment.now_s)
+
+    def _look(self, goal: Goal, route: Route, moment: Moment, *, tight: bool) -> tuple[Reach, Target | None]:
+        """Return what can be reached now, and the furthest place of the route in it."""
+        view = moment.map_view
+        costs = self.surroundings.costs(view, moment.T_grid_base, moment.now_s, tight=tight)
+        reach = reach_from(costs, moment.T_grid_base)
+        return reach, choose_target(route, goal, view.T_grid_node, reach, self._tolerance_m())
 
     def _start_over(self, now_s: float) -> None:
         """The way is another one now: what was measured along the old one no longer counts."""

@@ -17,6 +17,8 @@ from lemtomap.topo.events import EdgeBlocked, NavEvent
 from lemtomap.types import MapView, RouteGraph, Twist
 
 NEAR_BARRIER_M = 1.0
+SHUT_IN_M2 = 1.0
+"""A robot that can reach less floor than this is held by a chair or by noise, not by a closed door."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +71,8 @@ class WayKeeper:
             del self._closed_s[edge_id]
             moment.events.append(EdgeBlocked(a, b, 0.0))
         route, places = self.route, moment.map_view.T_grid_node
-        if route is None:
-            return None
+        if route is None or (target is None and reach.area_m2() < SHUT_IN_M2):
+            return None  # shut in by something near: no edge is to blame
         beyond = 0 if target is None else target.index
         barrier = find_barrier(route, places, reach, beyond)
         if barrier is None and plan is not None:
