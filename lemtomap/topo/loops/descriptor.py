@@ -18,6 +18,8 @@ SCALE = (
 )
 THIN_M = 0.1  # points nearer than this count once, so that a wall seen often weighs no more
 
+ROW = 1 << 20  # cells of one row: no place is 100 km wide
+
 _ANGLES = np.arange(DIRECTIONS) * np.pi / DIRECTIONS
 _WAVES = np.array(WAVE_NUMBERS)[:, None, None] * np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 _GAINS = np.array([1.0] + [2.0] * (HARMONICS - 1)) / DIRECTIONS
@@ -28,8 +30,9 @@ def describe(points_node: NDArray[np.floating]) -> bytes:
     points = np.asarray(points_node, dtype=np.float64)
     if len(points) == 0:
         return bytes(BYTES)
-    thin = np.unique(np.round(points / THIN_M).astype(np.int64), axis=0) * THIN_M
-    phases = thin @ _WAVES.reshape(-1, 2).T
+    cells = np.round(points / THIN_M).astype(np.int64)
+    _, first = np.unique(cells[:, 0] * ROW + cells[:, 1], return_index=True)
+    phases = ((cells[first] * THIN_M) @ _WAVES.reshape(-1, 2).T).astype(np.float32)
     size = np.hypot(np.cos(phases).mean(axis=0), np.sin(phases).mean(axis=0))
     spectrum = np.abs(np.fft.rfft(size.reshape(len(WAVE_NUMBERS), DIRECTIONS), axis=1))[:, :HARMONICS]
     return np.minimum(255, np.round(SCALE * spectrum * _GAINS)).astype(np.uint8).tobytes()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, compose, transform
+from lemtomap.topo.loops.descriptor import ROW
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.place import decode_place
 
@@ -72,7 +73,8 @@ class PlaceBook:
                 parts.append(transform(T_node_other, points))
         joined = np.concatenate(parts)
         joined = joined[np.hypot(joined[:, 0], joined[:, 1]) <= self._company_m]
-        _, first = np.unique(np.round(joined / RASTER_M).astype(np.int64), axis=0, return_index=True)
+        cells = np.round(joined / RASTER_M).astype(np.int64)
+        _, first = np.unique(cells[:, 0] * ROW + cells[:, 1], return_index=True)
         joined = np.ascontiguousarray(joined[np.sort(first)])
         stride = max(1.0, len(joined) / self._search_points)
         chosen = joined[
