@@ -228,9 +228,7 @@ class SafetyGate:
         delay_s = lim.reaction_s + max(0.0, now_s - evidence.scan_stamp_s)
         safe_mps = _stoppable_mps(max(0.0, free_m), delay_s, lim.brake_mps2)
         share = min(1.0, safe_mps / abs(allowed.v_mps))
-        turn = (
-            share if share > lim.creep_share else 1.0
-        )  # a round body that (almost) stands turns without harm
+        turn = share if share > lim.creep_share else 1.0  # a round body that almost stands turns unharmed
         return _lessened(allowed, share * allowed.v_mps, turn * allowed.w_radps, Reason.NEAR_OBSTACLE)
 
 

@@ -234,14 +234,15 @@ MUTANTS = (
     ),
     _m(
         "leaves the arc",
-        "share * allowed.v_mps, share * allowed.w_radps",
+        "share * allowed.v_mps, turn * allowed.w_radps",
         "share * allowed.v_mps, allowed.w_radps",
     ),
     _m(
         "turns slower only",
-        "share * allowed.v_mps, share * allowed.w_radps",
-        "allowed.v_mps, share * allowed.w_radps",
+        "share * allowed.v_mps, turn * allowed.w_radps",
+        "allowed.v_mps, turn * allowed.w_radps",
     ),
+    _m("no turning away", "turn = share if share > lim.creep_share else 1.0", "turn = share"),
     _m("brakes without limit", "2.0 * free_m / brake_mps2))", "0.0))"),
     _m("future stamps count", "return -CLOCK_SLACK_S <= now_s - stamp_s", "return now_s - stamp_s"),
     _m("no clock slack", "return -CLOCK_SLACK_S <= now_s", "return 0.0 <= now_s"),
