@@ -141,7 +141,8 @@ def _target_at(
     border_m = 0.0 if final else BORDER_M
     if not reach.costs.holds(place, border_m):
         return None
-    found = reach.nearest(place, goal_tolerance_m if final else SNAP_M)
+    exact = final and goal.p_node != (0.0, 0.0)
+    found = reach.nearest(place, goal_tolerance_m if exact else max(SNAP_M, goal_tolerance_m))
     if found is None and final and goal.p_node != (0.0, 0.0):  # go to its node and look from there
         final = False
         found = reach.nearest(T_grid_node[route.nodes[index]], SNAP_M)
