@@ -1,13 +1,9 @@
 """Putting a robot together from its settings."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from lemtomap.errors import BadSetting
-from lemtomap.grid.config import SlamConfig
-from lemtomap.grid.gmapping import RollingGmapping
-from lemtomap.grid.growing import GrowingGmapping
-from lemtomap.grid.mapper import WindowMatcher
+from lemtomap.grid import DEFAULT_SLAM, SLAMS
 from lemtomap.nav.navigator import Navigator
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
@@ -20,12 +16,6 @@ from robot.exchange import Exchange
 from robot.mapping import GridSlam, MappingStep
 from robot.navigating import NavigationStep
 
-SLAMS: dict[str, Callable[[SlamConfig, int], GridSlam]] = {
-    "rolling": RollingGmapping,
-    "window": WindowMatcher,
-    "gmapping": GrowingGmapping,
-}
-
 
 def build_slam(name: str, config: RobotConfig, seed: int) -> GridSlam:
     """Return the grid SLAM of this name. Raises BadSetting."""
@@ -36,7 +26,7 @@ def build_slam(name: str, config: RobotConfig, seed: int) -> GridSlam:
 
 
 def build_core(
-    config: RobotConfig, map_path: Path, *, slam: str = "rolling", seed: int = 0, durable: bool = True
+    config: RobotConfig, map_path: Path, *, slam: str = DEFAULT_SLAM, seed: int = 0, durable: bool = True
 ) -> RobotCore:
     """Return a robot that maps into `map_path`, a new file or an existing map. Raises BadMap, BadSetting."""
     exchange = Exchange()

@@ -199,7 +199,7 @@ def replay(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="folder for the results; default runs/replay_DATE_TIME")
     ] = None,
-    slam: Annotated[str, typer.Option(help="rolling, gmapping or window")] = "rolling",
+    slam: Annotated[str, typer.Option(help="window, rolling or gmapping")] = "window",
     seed: Annotated[int, typer.Option(metavar="N", help="of the particles")] = 0,
 ) -> None:
     """Feed a recorded run's bytes through the same drivers and map it anew, as fast as the machine can."""

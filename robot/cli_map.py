@@ -47,10 +47,14 @@ def map_(
     out: Annotated[Path, typer.Option(metavar="DIR", help="folder for map, trajectory, picture and summary")],
     *,
     slam: Annotated[
-        Slam, typer.Option(help="rolling window, whole-grid GMapping, or single window matcher")
-    ] = Slam.ROLLING,
+        Slam | None,
+        typer.Option(
+            help="window: one pose, one rolling window (default); rolling: particles, a rolling window each "
+            "(default with --particles); gmapping: particles, the whole grid each"
+        ),
+    ] = None,
     particles: Annotated[
-        int | None, typer.Option(metavar="N", min=1, max=1000, help="default 5, gmapping 30")
+        int | None, typer.Option(metavar="N", min=1, max=1000, help="default 5 (rolling), 30 (gmapping)")
     ] = None,
     window: Annotated[float, typer.Option(metavar="M", help="width of the window, metres")] = 20.0,
     max_range: Annotated[
@@ -63,7 +67,8 @@ def map_(
     from robot.map_log import MapLogOptions, map_log
     from robot.progress import progress_bar
 
-    options = MapLogOptions(log, out, slam.value, particles, window, max_range, seed)
+    kind = slam or (Slam.WINDOW if particles is None else Slam.ROLLING)
+    options = MapLogOptions(log, out, kind.value, particles, window, max_range, seed)
     with progress_bar(f"mapping {log.name}") as bar:
         told = map_log(options, bar)
     typer.echo(told)

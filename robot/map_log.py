@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.grid import GridSlam, GrowingGmapping, RollingGmapping, SlamConfig, WindowMatcher
+from lemtomap.errors import BadSetting
+from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam, SlamConfig
 from lemtomap.pipeline import Mapper
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.loops import LoopRecogniser
@@ -23,12 +24,7 @@ from robot.logs import Log, open_log
 from robot.overview import Overview, WallSketch, draw
 from robot.progress import Bar
 
-SLAMS: dict[str, Callable[[SlamConfig, int], GridSlam]] = {
-    "rolling": RollingGmapping,
-    "gmapping": GrowingGmapping,
-    "window": WindowMatcher,
-}
-BASELINE_PARTICLES = 30  # growing grid: what Grisetti et al. 2007 used on these logs
+PARTICLES = {"window": 1, "gmapping": 30}  # growing grid: what Grisetti et al. 2007 used on these logs
 BAR_PERIOD_S = 0.2
 PROFILE_ROWS = 200
 
@@ -39,7 +35,7 @@ class MapLogOptions:
 
     log: Path
     out: Path
-    slam: str = "rolling"
+    slam: str = DEFAULT_SLAM
     particles: int | None = None
     window_m: float = 20.0
     max_range_m: float | None = None
@@ -47,7 +43,9 @@ class MapLogOptions:
 
     def slam_config(self) -> SlamConfig:
         """Return the metric layer's settings; raises BadSetting when they cannot work."""
-        default = BASELINE_PARTICLES if self.slam == "gmapping" else SlamConfig().particles
+        if self.slam == "window" and self.particles not in (None, 1):
+            raise BadSetting(f"particles {self.particles}: --slam window follows one pose only")
+        default = PARTICLES.get(self.slam, SlamConfig().particles)
         return SlamConfig(
             particles=self.particles or default, window_m=self.window_m, max_range_m=self.max_range_m
         )

@@ -12,6 +12,7 @@ from serial.tools import list_ports
 
 from drivers.port import BytePort, open_serial
 from lemtomap.errors import BadSetting
+from lemtomap.grid import DEFAULT_SLAM
 from lemtomap.topo.reader import TopoReader
 from robot import ports
 from robot.config import PortsConfig, RobotConfig, load
@@ -36,7 +37,7 @@ class RobotOptions:
     out: Path | None = None
     config: Path | None = None
     seed: int = 0
-    slam: str = "rolling"
+    slam: str = DEFAULT_SLAM
     by_hand: bool = False
     """Drive by the keyboard, over whatever the mission wants."""
 

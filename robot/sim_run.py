@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.port import open_serial
+from lemtomap.grid import DEFAULT_SLAM
 from robot.config import RobotConfig
 from robot.display import has_display
 from robot.exchange import Ended, MissionState
@@ -31,7 +32,7 @@ class SimOptions:
     duration_s: float
     out: Path
     seed: int = 0
-    slam: str = "rolling"
+    slam: str = DEFAULT_SLAM
     fast: bool = False
     gui: bool = False
     live: bool = True

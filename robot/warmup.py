@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lemtomap.grid import DEFAULT_SLAM
 from lemtomap.nav.types import Contact, ContactKind, Goal
 from lemtomap.se2 import Pose
 from lemtomap.types import Odometry, Scan
@@ -24,7 +25,7 @@ STEP_M, SCAN_S = 0.12, 0.1
 BEAMS, FIRST_RAD = 682, -2.0862138
 
 
-def warm_up(config: RobotConfig, slam: str = "rolling") -> None:
+def warm_up(config: RobotConfig, slam: str = DEFAULT_SLAM) -> None:
     """Compile or load all kernels of mapping, navigation and exploration: some 20 s at first, then 1 s."""
     with tempfile.TemporaryDirectory(prefix="lemtomap-") as folder:
         core = build_core(config, Path(folder) / "warm.lemto", slam=slam, durable=False)

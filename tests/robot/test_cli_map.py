@@ -71,7 +71,7 @@ def test_summary_map_and_picture_agree(out):
     assert told["nodes"] == nodes
     assert nodes >= 4
     assert told["map_bytes"] == (out / "map.lemto").stat().st_size
-    assert told["seed"] == told["config"]["particles"] - 2 == 3
+    assert (told["seed"], told["config"]["slam"], told["config"]["particles"]) == (3, "window", 1)
     needed = {
         "updates",
         "cpu_s",
@@ -93,10 +93,21 @@ def test_same_log_and_seed_give_the_same_bytes(log, out, tmp_path):
         assert (tmp_path / "again" / name).read_bytes() == (out / name).read_bytes()
 
 
-@pytest.mark.parametrize("slam", ["gmapping", "window"])
-def test_the_other_metric_layers_map_it_too(log, tmp_path, slam):
-    assert main(["map", str(log), "--out", str(tmp_path / slam), "--slam", slam, "--particles", "2"]) == 0
-    assert len((tmp_path / slam / "trajectory.tum").read_text().splitlines()) == SCANS
+@pytest.mark.parametrize(
+    ("options", "slam"),
+    [(["--slam", "gmapping", "--particles", "2"], "gmapping"), (["--particles", "2"], "rolling")],
+)
+def test_particles_map_it_too(log, tmp_path, options, slam):
+    out = tmp_path / slam
+    assert main(["map", str(log), "--out", str(out), *options]) == 0
+    assert len((out / "trajectory.tum").read_text().splitlines()) == SCANS
+    assert json.loads((out / "summary.json").read_text())["config"]["slam"] == slam
+
+
+def test_a_single_hypothesis_with_particles_is_refused(log, tmp_path, capsys):
+    assert main(["map", str(log), "--out", str(tmp_path / "x"), "--slam", "window", "--particles", "2"]) == 2
+    assert "follows one pose only" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
 
 
 @pytest.fixture
