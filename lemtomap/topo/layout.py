@@ -42,11 +42,23 @@ def lay_out_edges(node_ids: Iterable[int], edges: list[Edge]) -> Layout:
     ids = list(start)
     index = {node_id: k for k, node_id in enumerate(ids)}
     poses = np.array([start[node_id] for node_id in ids]).reshape(-1, 3)
-    problem = Problem.of_edges(edges, index)
     held = np.array([component[node_id] == node_id for node_id in ids], dtype=bool)
-    solution = solve_whole(problem, poses, held) if len(problem.ends) else Solution(poses, 0.0, 0, True)
+    solution = _solved(edges, index, poses, held)
     placed = _side_by_side(np.array([component[node_id] for node_id in ids]), solution.poses)
     return Layout(dict(zip(ids, placed, strict=True)), component, solution.chi2)
+
+
+def _solved(edges: list[Edge], index: dict[int, int], poses: Pose, held: NDArray[np.bool_]) -> Solution:
+    """Return the better of two robust solutions: from the driven way, and from all edges believed at once.
+
+    Metres of drift make true closures look like wrong ones from the first start, one wrong closure spoils
+    the second; neither start is right for every map.
+    """
+    problem = Problem.of_edges(edges, index)
+    if not len(problem.ends):
+        return Solution(poses, 0.0, 0, True)
+    believed = solve_whole(Problem.of_edges(edges, index, robust=False), poses, held).poses
+    return min((solve_whole(problem, start, held) for start in (poses, believed)), key=lambda s: s.chi2)
 
 
 def trajectory(layout: Layout, trail: ScanTrail) -> tuple[NDArray[np.float64], Pose]:
