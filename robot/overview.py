@@ -75,6 +75,7 @@ def draw(path: Path, overview: Overview) -> None:
     _draw_whole(whole, overview)
     _draw_window(figure.add_subplot(layout[0, 1]), overview)
     _write_facts(figure.add_subplot(layout[1, 1]), overview)
+    figure.legend(handles=_legend(overview), loc="outside lower left", ncols=6, fontsize=9)
     figure.suptitle(overview.title, fontsize=15, fontweight="bold")
     partial = path.with_name(f".{path.name}.part")
     figure.savefig(partial, format="png")
@@ -98,13 +99,10 @@ def _draw_whole(axes: Axes, overview: Overview) -> None:
     axes.set_xlim(low[0] - margin_m, high[0] + margin_m)
     axes.set_ylim(low[1] - margin_m, high[1] + margin_m)
     _draw_robot(axes, path[-1], max(0.25, 0.012 * float((high - low).max())))
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="N")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     axes.set_title("the whole map, solved once for this picture", fontsize=11)
-    axes.legend(
-        handles=_legend(overview), loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=3, fontsize=9
-    )
 
 
 def _draw_walls(axes: Axes, walls: NDArray[np.float64]) -> None:
