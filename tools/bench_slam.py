@@ -19,17 +19,12 @@ from pathlib import Path
 import numpy as np
 
 from lemtomap import se2
-from lemtomap.grid import GridSlam, GrowingGmapping, RollingGmapping, SlamConfig, WindowMatcher
+from lemtomap.grid import SLAMS, GridSlam, RollingGmapping, SlamConfig, WindowMatcher
 from lemtomap.se2 import Pose
 from lemtomap.types import Odometry, Scan
 from robot.logs import open_log
 from tools.relations import read_relations, relation_errors
 
-KINDS: dict[str, type[WindowMatcher | RollingGmapping]] = {
-    "window": WindowMatcher,
-    "rolling": RollingGmapping,
-    "gmapping": GrowingGmapping,
-}
 START_STEP = 7
 LOCAL_M, BROKEN_M = 10.0, 0.25
 PASSES = 200
@@ -79,9 +74,9 @@ def bench_logs(options: argparse.Namespace) -> None:
             for kind in options.slam:
                 particles = options.particles or SlamConfig().particles
                 config = SlamConfig(particles=particles, max_range_m=range_m)
-                KINDS[kind](config, 0).update(pairs[0][1], pairs[0][0])  # compile outside the clock
+                SLAMS[kind](config, 0).update(pairs[0][1], pairs[0][0])  # compile outside the clock
                 runs = [
-                    run_log(KINDS[kind](config, seed), pairs[START_STEP * seed :], relations)
+                    run_log(SLAMS[kind](config, seed), pairs[START_STEP * seed :], relations)
                     for seed in range(options.seeds)
                 ]
                 print(f"{name:7s} {range_m:4.1f}m  {kind:8s} {_row(runs)}", flush=True)
@@ -139,7 +134,7 @@ def bench_corridor(options: argparse.Namespace) -> None:
         for gate in (SlamConfig().degenerate_below, 0.0):
             config = replace(SlamConfig(), degenerate_below=gate)
             for seed in range(options.seeds):
-                along, odometry, across, mu = drive_corridor(KINDS[kind](config, seed), seed)
+                along, odometry, across, mu = drive_corridor(SLAMS[kind](config, seed), seed)
                 figures = f"{along:8.3f} ({odometry:6.3f})  {across:14.3f}  {mu:.3f}"
                 figures = f"{along:8.3f} ({odometry:6.3f})  {across:14.3f}  {mu:.3f}"
                 print(f"{kind:8s} {gate:5.2f}  {figures}", flush=True)
@@ -168,7 +163,7 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("what", choices=["logs", "corridor", "kernels"])
     parser.add_argument("data", type=Path, nargs="?", default=Path("../shared/data/carmen"))
-    parser.add_argument("--slam", nargs="+", choices=sorted(KINDS), default=["window", "rolling"])
+    parser.add_argument("--slam", nargs="+", choices=sorted(SLAMS), default=["window", "rolling"])
     parser.add_argument("--logs", nargs="+", default=["intel", "aces"])
     parser.add_argument("--ranges", nargs="+", type=float, default=[10.0, 5.6])
     parser.add_argument("--particles", type=int)

@@ -47,7 +47,7 @@ def test_the_robot_maps_and_drives_in_real_time_and_leaves_nothing_behind(tmp_pa
         runtime.run(parse_mission("explore"), 10.0)
         runtime.core.close()
         runtime.onlooker.close()
-    assert hardware.truth["path_m"] > 0.05  # a starved machine gets no further in these seconds
+    assert hardware.truth["path_m"] > 0.5
     assert hardware.truth["contacts"] == 0
     assert runtime.core.mapping.scans > 50
     assert process.num_fds() <= before[0] + 1
