@@ -55,9 +55,13 @@ class ViewerConfig:
     """How much the viewer takes; rates in Hz of run time."""
 
     window_hz: float = 1.0  # 160 kB each before compression; the map changes slower than the robot
+    costmap_hz: float = 0.5  # four bytes a cell
     pose_hz: float = 10.0  # dimos issue 1509: faster only fills memory
-    scan_hz: float = 5.0
-    plot_hz: float = 10.0
+    scan_hz: float = 2.0  # 8 kB each, which do not compress
+    plan_hz: float = 2.5
+    plot_hz: float = 5.0
+    timing_hz: float = 2.0
+    flush_s: float = 2.0  # of wall time between two writes, unless somebody watches: each costs 1 kB a path
     memory_limit: str = "1GB"  # of the spawned viewer, whose own default is 75 % of the machine
 
 
@@ -70,7 +74,8 @@ class Viewer:
         self._trail: deque[tuple[float, float, float]] = deque(maxlen=TRAIL_LENGTH)
         self._state = ""
         self._truth: TruthView | None = None
-        self._stream = rr.RecordingStream("lemtomap", make_default=False)
+        batches = None if live else rr.ChunkBatcherConfig(flush_tick=self._config.flush_s)
+        self._stream = rr.RecordingStream("lemtomap", make_default=False, batcher_config=batches)
         sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(recording))]
         if live and self._open_window():
             sinks.append(rr.GrpcSink())
@@ -116,12 +121,12 @@ class Viewer:
         if state != self._state:
             self._state = state
             self._stream.log("state/navigation", rr.StateChange(state=state))
-        if self._is_due("plan", now_s, self._config.scan_hz):
+        if self._is_due("plan", now_s, self._config.plan_hz):
             self._stream.log("grid/plan/route", _strip(route_grid, Z_ROUTE))
             self._stream.log("grid/plan/path", _strip(path_grid, Z_ROUTE))
             ends = path_grid[-1:] if len(path_grid) else path_grid
             self._stream.log("grid/plan/goal", rr.Points3D(_lift(ends, Z_SCAN)))
-        if costmap is not None and self._is_due("costmap", now_s, self._config.window_hz):
+        if costmap is not None and self._is_due("costmap", now_s, self._config.costmap_hz):
             self._log_costmap(costmap)
 
     def show_velocity(self, now_s: float, wanted: Twist, sent: Twist, measured: Twist) -> None:
@@ -135,7 +140,7 @@ class Viewer:
         """Plot what each part of the program took in its last cycle, in milliseconds."""
         self._at(now_s)
         for name, value in times_ms.items():
-            if self._is_due(f"timing/{name}", now_s, self._config.plot_hz):
+            if self._is_due(f"timing/{name}", now_s, self._config.timing_hz):
                 self._stream.log(f"timing/{name}", rr.Scalars(value))
 
     def show_figure(self, now_s: float, name: str, value: float) -> None:

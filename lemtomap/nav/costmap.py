@@ -3,7 +3,7 @@
 Everything lives in the grid frame on the window's own cells and moves along when the window rolls.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +48,14 @@ class Costs:
     def to_grid(self, rows_cols: NDArray[np.float64]) -> Points:
         """Return points (N, 2) in the grid frame of [row, col] pairs (N, 2)."""
         return np.asarray(rows_cols[:, ::-1] * self.resolution_m + np.array(self.origin_m))
+
+    def over_seen_floor(self, p_robot_grid: ArrayLike) -> "Costs":
+        """Return the same costs with unseen floor closed, but not where the robot stands."""
+        cost = np.where(self.state == kernels.UNKNOWN, np.float32(np.inf), self.cost)
+        if self.holds(p_robot_grid):
+            row, col = (int(index) for index in self.cell(p_robot_grid))
+            cost[row, col] = self.cost[row, col]
+        return replace(self, cost=cost)
 
     def view(self) -> CostmapView:
         """Return the picture viewers show."""

@@ -110,6 +110,7 @@ class Explorer:
         config = self.config
         self._costmap.follow_window(map_view.grid)
         costs = self._costmap.build(map_view.stamp_s, np.empty((0, 2)), T_grid_base[:2])
+        costs = costs.over_seen_floor(T_grid_base[:2])
         reach = reach_from(costs, T_grid_base)
         self._memory.take(costs, map_view.T_grid_node, T_grid_base)
         seen = self._memory.recall(costs, map_view.T_grid_node)
