@@ -7,7 +7,7 @@ wishes -> mux -> smoother -> safety gate -> wheels;  condition -> LEDs and sound
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from robot.feedback import Condition, Indicators, Signal
 from robot.notes import describe_event
 from robot.reflex import Retreat
 from robot.safety import Allowed, Evidence, Reason, SafetyGate, Sides
-from robot.velocity import DOCKING, NAVIGATION, SAFETY, TELEOP, VelocityMux, VelocitySmoother
+from robot.velocity import DOCKING, NAVIGATION, SAFETY, TELEOP, VelocityMux, VelocitySmoother, Wish
 
 SCAN_PATIENCE_S = 0.3  # a scan whose odometry has not come by then belongs to a silent base
 
@@ -169,8 +169,7 @@ class BaseStep:
         self._smoother.note_sent(sent.v_mps, sent.w_radps)
         self._bumped = self._fell = Sides()
         self._note_reason(sent.reason, now_s)
-        status = self._status(now_s)
-        self._exchange.base_status.put(replace(status, wish=wish, sent=sent))
+        self._exchange.base_status.put(self._status(wish, sent, now_s))
         return Commands(sent, tuple(self._indicators.update(self._condition(sent.reason), now_s)))
 
     def _offer_wishes(self, now_s: float) -> None:
@@ -193,7 +192,8 @@ class BaseStep:
         sample, scan, last = self._sample, self._scan, self._last
         if sample is None or last is None:
             return Evidence(velocity_stamp_s=velocity_stamp_s)
-        evidence = Evidence(
+        points = np.zeros((0, 2)) if scan is None else bridge.points_now(scan.sighting, last)
+        return Evidence(
             velocity_stamp_s=velocity_stamp_s,
             base_stamp_s=sample.arrival_s,
             bumper=bridge.sides_of_bumper(sample.bumper) | self._bumped,
@@ -202,12 +202,9 @@ class BaseStep:
             over_current=bool(sample.over_current),
             adapter=bridge.on_adapter(sample),
             battery_v=sample.battery.voltage_v,
-        )
-        if scan is None:
-            return evidence
-        points = bridge.points_now(scan.sighting, last)
-        return replace(
-            evidence, scan_stamp_s=scan.arrival_s, points_base=points, valid_beams=scan.valid_beams
+            scan_stamp_s=-math.inf if scan is None else scan.arrival_s,
+            points_base=points,
+            valid_beams=0 if scan is None else scan.valid_beams,
         )
 
     def _condition(self, reason: Reason) -> Condition:
@@ -230,13 +227,15 @@ class BaseStep:
             self._exchange.note(now_s, "safety", f"no longer: {self._reason}")
         self._reason = reason
 
-    def _status(self, now_s: float) -> BaseStatus:
+    def _status(self, wish: Wish | None, sent: Allowed, now_s: float) -> BaseStatus:
         sample = self._sample
         if sample is None:
-            return BaseStatus(now_s)
+            return BaseStatus(now_s, wish=wish, sent=sent)
         return BaseStatus(
             stamp_s=now_s,
             odometry=self._last,
+            wish=wish,
+            sent=sent,
             battery_v=sample.battery.voltage_v,
             battery_percent=sample.battery.percent,
             bumped=bool(sample.bumper),

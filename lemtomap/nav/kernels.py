@@ -120,17 +120,17 @@ def add_live(state: U1, last_hit_s: F8, hits: U1, now_s: float, decay_s: float, 
 @njit(nogil=True, cache=True)
 def _lower(best: F4, other: F4, aside: float) -> None:
     """Keep the lesser of best and other + aside, cell by cell."""
+    further = np.float32(aside)
     for c in range(best.size):
-        further = other[c] + aside
-        best[c] = further if further < best[c] else best[c]
+        best[c] = min(best[c], other[c] + further)
 
 
 @njit(nogil=True, cache=True)
 def clearance_transform(state: U1, reach: float) -> F4:
     """Return float32 distance in cells from each cell centre to the nearest LETHAL centre, capped at reach.
 
-    First along columns, then the best of each row within reach: both inner loops run along memory, which beats
-    the lower envelopes of Felzenszwalb and Huttenlocher (2012) as long as the reach is some dozen cells.
+    First along columns, then the best of each row within reach: both inner loops run along memory, which
+    beats the lower envelopes of Felzenszwalb and Huttenlocher (2012) for a reach of some dozen cells.
     """
     height, width = state.shape
     cap = np.float32(reach)
@@ -139,12 +139,12 @@ def clearance_transform(state: U1, reach: float) -> F4:
         above = down[max(r - 1, 0)]
         for c in range(width):
             further = above[c] + np.float32(1.0)
-            further = further if further < cap else cap
+            further = min(cap, further)
             down[r, c] = np.float32(0.0) if state[r, c] == LETHAL else further
     for r in range(height - 2, -1, -1):
         for c in range(width):
             further = down[r + 1, c] + np.float32(1.0)
-            down[r, c] = further if further < down[r, c] else down[r, c]
+            down[r, c] = min(down[r, c], further)
     out = np.full((height, width), cap, dtype=np.float32)
     square = np.empty(width, dtype=np.float32)
     best = np.empty(width, dtype=np.float32)
@@ -157,12 +157,11 @@ def clearance_transform(state: U1, reach: float) -> F4:
         if empty:
             continue
         for k in range(1, min(int(reach), width - 1) + 1):
-            aside = np.float32(k * k)
-            _lower(best[:-k], square[k:], aside)
-            _lower(best[k:], square[:-k], aside)
+            _lower(best[:-k], square[k:], float(k * k))
+            _lower(best[k:], square[:-k], float(k * k))
         for c in range(width):
             away = np.sqrt(best[c])
-            out[r, c] = away if away < cap else cap
+            out[r, c] = min(cap, away)
     return out
 
 

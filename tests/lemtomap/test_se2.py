@@ -29,6 +29,12 @@ def test_compose_is_associative(a, b, c):
     assert close(se2.compose(se2.compose(a, b), c), se2.compose(a, se2.compose(b, c)), 1e-7)
 
 
+@given(poses, poses)
+def test_one_pose_and_a_row_of_poses_give_the_same(T_a_b, T_b_c):
+    assert close(se2.compose(T_a_b[None], T_b_c)[0], se2.compose(T_a_b, T_b_c))
+    assert close(se2.inverse(T_a_b[None])[0], se2.inverse(T_a_b))
+
+
 @given(poses, poses, metres, metres)
 def test_transform_agrees_with_compose(T_a_b, T_b_c, x_m, y_m):
     point = np.array([x_m, y_m])
