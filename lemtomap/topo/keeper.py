@@ -85,7 +85,7 @@ class PlaceKeeper:
         boundary = decode_place(place.boundary)
         centre = (float(standing.T_grid_node[0]), float(standing.T_grid_node[1]))
         radius_m = boundary.radius_m + 1.0
-        hits = self.hits.around(centre, radius_m, grid, self.config.occupied_from)
+        hits = self.hits.faces_around(centre, radius_m, grid, self.config.occupied_from)
         predicted = (standing.T_grid_node, standing.covariance)
         return match_place(boundary, hits, grid, predicted, self.config.match)
 
@@ -105,9 +105,11 @@ class PlaceKeeper:
     def _take(self, node_id: int, standing: Standing, grid: GridView, now_s: float) -> list[Taken]:
         centre = (float(standing.T_grid_node[0]), float(standing.T_grid_node[1]))
         radius_m = self.config.place_radius_m
-        hits = self.hits.around(centre, radius_m * np.sqrt(2.0), grid, self.config.occupied_from)
-        points_node = transform(inverse(standing.T_grid_node), hits)
-        code = encode_place(points_node, radius_m, self.config.place_byte_budget)
+        hits = self.hits.faces_around(centre, radius_m * np.sqrt(2.0), grid, self.config.occupied_from)
+        points_node = transform(inverse(standing.T_grid_node), hits[:, :2])
+        whence_node = transform(np.array([0.0, 0.0, -standing.T_grid_node[2]]), hits[:, 2:])
+        seen_node = np.concatenate([points_node, whence_node], axis=1)
+        code = encode_place(seen_node, radius_m, self.config.place_byte_budget)
         descriptor = b"" if self._describe is None else self._describe(points_node)
         place = Place(now_s, code, descriptor)
         self._graph.store.put_place(node_id, place)

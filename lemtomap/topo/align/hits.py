@@ -26,7 +26,7 @@ class HitMap:
     def __init__(self, size_m: float = 24.0, recent_m: float = RECENT_M) -> None:
         cells = round(size_m / CELL_M)
         self._owner = np.full((cells, cells, 2), np.iinfo(np.int32).min, np.int32)
-        self._sums = np.zeros((cells, cells, 4))
+        self._sums = np.zeros((cells, cells, 6))
         self._recent_m = recent_m
         self._way_m = 0.0
         self._last: Pose | None = None
@@ -41,12 +41,19 @@ class HitMap:
             self._way_m += step_m
         self._last = np.array(T_grid_base)
         points = transform(T_grid_base, points_base)
-        kernels.add_hits(points, CELL_M, self._owner, self._sums, self._way_m, self._recent_m)
+        at = (float(T_grid_base[0]), float(T_grid_base[1]))
+        kernels.add_hits(points, *at, CELL_M, self._owner, self._sums, self._way_m, self._recent_m)
 
     def around(
         self, centre_m: tuple[float, float], radius_m: float, grid: GridView, occupied_from: int
     ) -> NDArray[np.float64]:
-        """Return the hits in a square that the window still holds for occupied, float64 (N, 2), grid frame.
+        """Return the hits in a square that the window still believes, float64 (N, 2), grid frame."""
+        return self.faces_around(centre_m, radius_m, grid, occupied_from)[:, :2]
+
+    def faces_around(
+        self, centre_m: tuple[float, float], radius_m: float, grid: GridView, occupied_from: int
+    ) -> NDArray[np.float64]:
+        """Return the same hits and from where they were seen, float64 (N, 4): x, y, mean unit vector thither.
 
         Without any hits (no scan points were given) the boundary cells of the window stand in for them.
         """

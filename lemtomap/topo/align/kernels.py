@@ -11,11 +11,23 @@ Singles = NDArray[np.float32]
 Indices = NDArray[np.int32]
 Cells = NDArray[np.int8]
 
+OTHER_FACE = -0.2  # cosine; a glancing look at a face that is not quite straight still sees its front
+
 
 @njit(nogil=True, cache=True)
-def add_hits(points: Values, cell: float, owner: Indices, sums: Values, now: float, recent: float) -> None:
-    """Add grid-frame points to a ring of cells: owner (S, S, 2) is whose cell it is, sums (S, S, 4) x, y, n
-    and when it was hit last, in metres of way like `now`.
+def add_hits(
+    points: Values,
+    from_x: float,
+    from_y: float,
+    cell: float,
+    owner: Indices,
+    sums: Values,
+    now: float,
+    recent: float,
+) -> None:
+    """Add grid-frame points seen from (from_x, from_y) to a ring of cells: owner (S, S, 2) is whose cell it
+    is, sums (S, S, 6) x, y, n, when it was hit last in metres of way like `now`, and the unit vectors to
+    where it was seen from.
 
     A cell that last belonged to another place of the building, or was hit too long ago, starts anew.
     """
@@ -30,11 +42,15 @@ def add_hits(points: Values, cell: float, owner: Indices, sums: Values, now: flo
             owner[r, c, 0], owner[r, c, 1] = row, col
             sums[r, c, :] = 0.0
         if sums[r, c, 2] > 100.0:  # the mean goes on following a wall that moved
-            sums[r, c, :] *= 0.5
+            sums[r, c, :3] *= 0.5
+            sums[r, c, 4:] *= 0.5
         sums[r, c, 0] += x
         sums[r, c, 1] += y
         sums[r, c, 2] += 1.0
         sums[r, c, 3] = now
+        distance = max(math.hypot(from_x - x, from_y - y), 1e-6)
+        sums[r, c, 4] += (from_x - x) / distance
+        sums[r, c, 5] += (from_y - y) / distance
 
 
 @njit(nogil=True, cache=True)
@@ -53,12 +69,14 @@ def collect_hits(
     origin_y: float,
     occupied_from: int,
 ) -> Values:
-    """Return the mean hits in a square, newer than `since`, that the window believes, float64 (N, 2)."""
+    """Return the mean hits in a square, newer than `since`, that the window believes, float64 (N, 4): x, y
+    and the mean unit vector to where it was seen from.
+    """
     size = owner.shape[0]
     rows, cols = occupancy.shape
     reach = min(math.ceil(radius / cell), size // 2 - 1)
     row0, col0 = math.floor(centre_y / cell), math.floor(centre_x / cell)
-    out = np.empty(((2 * reach + 1) ** 2, 2))
+    out = np.empty(((2 * reach + 1) ** 2, 4))
     count = 0
     for row in range(row0 - reach, row0 + reach + 1):
         for col in range(col0 - reach, col0 + reach + 1):
@@ -76,6 +94,8 @@ def collect_hits(
                         believed |= occupancy[i + di, j + dj] >= occupied_from
             if believed:
                 out[count, 0], out[count, 1] = x, y
+                out[count, 2] = sums[r, c, 4] / sums[r, c, 2]
+                out[count, 3] = sums[r, c, 5] / sums[r, c, 2]
                 count += 1
     return out[:count].copy()
 
@@ -91,23 +111,28 @@ def boundary_cells(
     radius: float,
     occupied_from: int,
 ) -> Values:
-    """Return the middles of occupied cells beside a free one within a square, float64 (N, 2), grid frame."""
+    """Return the occupied cells beside a free one within a square, float64 (N, 4), grid frame: middle, and
+    the direction of the free ones, from where such a cell was seen.
+    """
     rows, cols = occupancy.shape
     row0 = max(1, math.floor((centre_y - radius - origin_y) / resolution))
     row1 = min(rows - 1, math.ceil((centre_y + radius - origin_y) / resolution))
     col0 = max(1, math.floor((centre_x - radius - origin_x) / resolution))
     col1 = min(cols - 1, math.ceil((centre_x + radius - origin_x) / resolution))
-    out = np.empty((max(0, row1 - row0) * max(0, col1 - col0), 2))
+    out = np.empty((max(0, row1 - row0) * max(0, col1 - col0), 4))
     count = 0
     for r in range(row0, row1):
         for c in range(col0, col1):
             if occupancy[r, c] < occupied_from:
                 continue
-            free = False
+            free, to_x, to_y = False, 0.0, 0.0
             for dr, dc in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-                value = occupancy[r + dr, c + dc]
-                free |= 0 <= value < occupied_from // 2 + 1
+                if 0 <= occupancy[r + dr, c + dc] < occupied_from // 2 + 1:
+                    free = True
+                    to_x, to_y = to_x + dc, to_y + dr
             if free:
+                length = max(math.hypot(to_x, to_y), 1.0)
+                out[count, 2], out[count, 3] = to_x / length, to_y / length
                 out[count, 0] = origin_x + (c + 0.5) * resolution
                 out[count, 1] = origin_y + (r + 0.5) * resolution
                 count += 1
@@ -153,8 +178,19 @@ def nearest_field(
 
 
 @njit(nogil=True, cache=True)
+def same_face(nx: float, ny: float, targets: Values, t: int) -> bool:
+    """Tell whether a boundary whose front looks along (nx, ny) can be what was hit there.
+
+    A wall has two faces: what shows its back to where the hit was seen from is the other one, as far away as
+    the wall is thick. (0, 0) stands for a front that is not known.
+    """
+    return bool(nx * targets[t, 2] + ny * targets[t, 3] > OTHER_FACE)
+
+
+@njit(nogil=True, cache=True)
 def fit(
     points: Singles,
+    fronts: Singles,
     targets: Values,
     field: Indices,
     low_x: float,
@@ -163,7 +199,10 @@ def fit(
     pose: Values,
     sigma: float,
 ) -> float:
-    """Return how well points fit at a pose, 0..1: mean of exp(-d^2 / 2 sigma^2) to the nearest targets."""
+    """Return how well points fit at a pose, 0..1: mean of exp(-d^2 / 2 sigma^2) to the nearest targets.
+
+    fronts, float32 (N, 2): which way each point's face looks, (0, 0) where that is not known.
+    """
     size = field.shape[0]
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     total = 0.0
@@ -173,6 +212,10 @@ def fit(
         c, r = math.floor((x - low_x) / cell), math.floor((y - low_y) / cell)
         if 0 <= r < size and 0 <= c < size and field[r, c] >= 0:
             t = field[r, c]
+            fx = cos * fronts[k, 0] - sin * fronts[k, 1]
+            fy = sin * fronts[k, 0] + cos * fronts[k, 1]
+            if not same_face(fx, fy, targets, t):
+                continue
             sq = (targets[t, 0] - x) ** 2 + (targets[t, 1] - y) ** 2
             total += math.exp(-0.5 * sq / (sigma * sigma))
     return float(total / max(1, points.shape[0]))
@@ -181,6 +224,7 @@ def fit(
 @njit(nogil=True, cache=True)
 def search(
     points: Singles,
+    fronts: Singles,
     targets: Values,
     field: Indices,
     low_x: float,
@@ -210,7 +254,7 @@ def search(
             fits[i + shifts, j + shifts] = -1.0
             for t in range(-turns, turns + 1):
                 pose[2] = centre[2] + t * step_rad
-                value = fit(points, targets, field, low_x, low_y, cell, pose, sigma)
+                value = fit(points, fronts, targets, field, low_x, low_y, cell, pose, sigma)
                 fits[i + shifts, j + shifts] = max(fits[i + shifts, j + shifts], value)
                 if value > out[3]:
                     out[:3] = pose
@@ -226,6 +270,7 @@ def search(
 @njit(nogil=True, cache=True)
 def refine_system(
     points: Singles,
+    fronts: Singles,
     normals: Singles,
     straightness: Singles,
     targets: Values,
@@ -253,6 +298,10 @@ def refine_system(
         if not (0 <= r < size and 0 <= c < size) or field[r, c] < 0:
             continue
         t = field[r, c]
+        fx = cos * fronts[k, 0] - sin * fronts[k, 1]
+        fy = sin * fronts[k, 0] + cos * fronts[k, 1]
+        if not same_face(fx, fy, targets, t):
+            continue
         dx, dy = pose[0] + px - targets[t, 0], pose[1] + py - targets[t, 1]
         nx, ny = (
             cos * normals[k, 0] - sin * normals[k, 1],

@@ -73,7 +73,7 @@ def match_place(
     predicted: tuple[Pose, Covariance],
     config: MatchConfig,
 ) -> Match:
-    """Align a place with hits, float64 (N, 2), metres, grid frame.
+    """Align a place with hits, float64 (N, 2), metres, grid frame; two more columns: whence each was seen.
 
     `predicted` is T_grid_node and its covariance, float64 (3, 3) in axes of the node. Holds: a refused match
     returns exactly the prediction.
@@ -96,10 +96,12 @@ def match_place(
 
 
 def _field(targets: NDArray[np.float64], centre: Pose, half_m: float) -> _Field:
+    faces = np.zeros((len(targets), 4))
+    faces[:, : targets.shape[1]] = targets
     low = (float(centre[0] - half_m), float(centre[1] - half_m))
     size = round(2.0 * half_m / FIELD_CELL_M)
-    nearest = kernels.nearest_field(targets, *low, FIELD_CELL_M, size, FIELD_REACH_M)
-    return _Field(targets, nearest, low)
+    nearest = kernels.nearest_field(faces, *low, FIELD_CELL_M, size, FIELD_REACH_M)
+    return _Field(faces, nearest, low)
 
 
 def _searched(
@@ -115,7 +117,9 @@ def _searched(
     if half_m < step_m and half_rad < step_rad:
         return start
     extent = (half_m, step_m, half_rad, step_rad)
-    best = kernels.search(boundary.points, *field.plan, start, *extent, config.coarse_sigma_m, config.apart_m)
+    best = kernels.search(
+        boundary.points, boundary.fronts, *field.plan, start, *extent, config.coarse_sigma_m, config.apart_m
+    )
     ambiguous = best[4] > config.rival_share * best[3]
     return start if ambiguous else np.array(best[:3])
 
@@ -136,6 +140,7 @@ def _refined(
     for _ in range(ITERATIONS):
         seen, g, weight, error = kernels.refine_system(
             boundary.points,
+            boundary.fronts,
             boundary.normals,
             boundary.straightness,
             *field.plan,

@@ -2,7 +2,8 @@
 
 A wall's place across itself is what a match needs; along itself a decimetre is enough. So each set cell
 carries one small number: how far its points lie from the cell's middle along the boundary's normal, and the
-normal follows from the cells around it, on both sides of the coding.
+normal follows from the cells around it, on both sides of the coding. And whether the wall was seen from in
+front of that normal or from behind: a wall has two faces, and the other one stands where it does not.
 """
 
 from dataclasses import dataclass
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 from lemtomap.errors import BadMap
 from lemtomap.topo.place import kernels
 
-FORMAT = 1
+FORMAT = 2
 CELL_M = 0.1
 OFFSET_STEP_M = 0.025
 NORMAL_REACH_CELLS = 2
+SURE_SIDE = 0.2  # cosine of the mean look at a cell: glancing or from both sides, its front is not known
 HEADER_BYTES = 2
 MAX_RADIUS_M = 12.0
 SHRINK = 0.95  # each try at the byte budget keeps at most this much of the radius
@@ -30,6 +32,9 @@ class Boundary:
     """float32 (N, 2), metres."""
     normals: NDArray[np.float32]
     """float32 (N, 2), unit length, either of the two directions across the boundary."""
+    fronts: NDArray[np.float32]
+    """float32 (N, 2): the normal that points to where the boundary was seen from; (0, 0) where that is not
+    known."""
     straightness: NDArray[np.float32]
     """float32 (N,): 1 where the normal is sure, 0 where the boundary has no direction (a corner, a leg)."""
     radius_m: float
@@ -41,9 +46,11 @@ def encode_place(
 ) -> bytes:
     """Return the code of boundary points, float (N, 2), metres, node frame; NaN rows are left out.
 
+    Two more columns say which way each was seen from (a vector of length up to 1).
     With a byte budget the radius shrinks until the code fits.
     """
-    points = np.ascontiguousarray(points_node, dtype=np.float64).reshape(-1, 2)
+    points = np.zeros((len(points_node), 4))
+    points[:, : points_node.shape[1]] = points_node
     while True:
         cells = max(1, round(min(radius_m, MAX_RADIUS_M) / CELL_M))
         code = bytes([FORMAT, cells]) + _encode(points, cells)
@@ -57,14 +64,16 @@ def decode_place(blob: bytes) -> Boundary:
     if len(blob) < HEADER_BYTES or blob[0] != FORMAT or blob[1] == 0:
         raise BadMap("localisation data of an unknown format")
     cells = blob[1]
-    bitmap, levels = _canvas(cells), _canvas(cells).astype(np.int8)
-    kernels.decode(np.frombuffer(blob, np.uint8, offset=HEADER_BYTES), bitmap, levels, NORMAL_REACH_CELLS)
+    bitmap, levels, sides = _canvas(cells), _canvas(cells).astype(np.int8), _canvas(cells).astype(np.int8)
+    data = np.frombuffer(blob, np.uint8, offset=HEADER_BYTES)
+    kernels.decode(data, bitmap, levels, sides, NORMAL_REACH_CELLS)
     shape = kernels.cell_normals(bitmap, CELL_M, NORMAL_REACH_CELLS)
     offsets_m = levels[bitmap > 0].astype(np.float64) * OFFSET_STEP_M
     points = shape[:, :2] + offsets_m[:, None] * shape[:, 2:4]
     return Boundary(
         points.astype(np.float32),
         shape[:, 2:4].astype(np.float32),
+        (shape[:, 2:4] * sides[bitmap > 0][:, None]).astype(np.float32),
         shape[:, 4].astype(np.float32),
         cells * CELL_M,
     )
@@ -72,15 +81,20 @@ def decode_place(blob: bytes) -> Boundary:
 
 def _encode(points: NDArray[np.float64], cells: int) -> bytes:
     bitmap = _canvas(cells)
-    means = np.zeros((*bitmap.shape, 2))
+    means = np.zeros((*bitmap.shape, 4))
     kernels.fill_bitmap(points, CELL_M, bitmap, means)
     shape = kernels.cell_normals(bitmap, CELL_M, NORMAL_REACH_CELLS)
-    across_m = np.sum((means[bitmap > 0] - shape[:, :2]) * shape[:, 2:4], axis=1)
+    mean = means[bitmap > 0]
+    across_m = np.sum((mean[:, :2] - shape[:, :2]) * shape[:, 2:4], axis=1)
+    towards = np.sum(mean[:, 2:] * shape[:, 2:4], axis=1)
     limit = kernels.LEVELS // 2
     levels = _canvas(cells).astype(np.int8)
     steps = np.clip(np.rint(across_m / OFFSET_STEP_M), -limit, limit)
     levels[bitmap > 0] = np.where(shape[:, 4] < kernels.STRAIGHT, 0, steps)
-    return bytes(kernels.encode(bitmap, levels, NORMAL_REACH_CELLS))
+    sides = _canvas(cells).astype(np.int8)
+    is_sure = (shape[:, 4] >= kernels.STRAIGHT) & (np.abs(towards) >= SURE_SIDE)
+    sides[bitmap > 0] = np.where(is_sure, np.sign(towards), 0)
+    return bytes(kernels.encode(bitmap, levels, sides, NORMAL_REACH_CELLS))
 
 
 def _canvas(cells: int) -> NDArray[np.uint8]:

@@ -21,12 +21,13 @@ BITMAP_CONTEXTS = 128
 LEVELS = 5  # offsets -2..2
 STRAIGHT = 0.6  # only where the boundary has a direction there is an offset across it
 LEVEL_CONTEXTS = (LEVELS + 1) * 8
+SIDE_CONTEXTS = 6
 
 
 @njit(nogil=True, cache=True)
 def fresh_tables() -> Table:
     """Return [probability of a 1 in 65536ths, times seen] for every context before the first bit."""
-    tables = np.zeros((BITMAP_CONTEXTS + LEVEL_CONTEXTS, 2), np.int64)
+    tables = np.zeros((BITMAP_CONTEXTS + LEVEL_CONTEXTS + SIDE_CONTEXTS, 2), np.int64)
     for k in range(tables.shape[0]):
         tables[k, 0] = ONE // 2
     for context in range(BITMAP_CONTEXTS):
@@ -112,8 +113,27 @@ def level_context(bitmap: Bits, levels: Levels, row: int, col: int) -> int:
 
 
 @njit(nogil=True, cache=True)
-def encode(bitmap: Bits, levels: Levels, reach: int) -> Bits:
-    """Return the coded bitmap and the offset levels of its straight cells; both with a border of two."""
+def side_guess(bitmap: Bits, fronts: Values, row: int, col: int, shape: Values) -> tuple[int, int]:
+    """Return (context, side) to expect: that of the cell before this one, else towards the node.
+
+    fronts (rows, cols, 2) holds the signed normals of the cells coded so far, zero where the front is not
+    known; shape is this cell's row of cell_normals.
+    """
+    for dr, dc in ((0, -1), (-1, 0), (-1, -1), (-1, 1)):
+        if bitmap[row + dr, col + dc]:
+            fx, fy = fronts[row + dr, col + dc]
+            if fx == 0.0 and fy == 0.0:
+                return 0, 1 if shape[2] * shape[0] + shape[3] * shape[1] < 0.0 else -1
+            return 1, 1 if fx * shape[2] + fy * shape[3] >= 0.0 else -1
+    return 2, 1 if shape[2] * shape[0] + shape[3] * shape[1] < 0.0 else -1
+
+
+@njit(nogil=True, cache=True)
+def encode(bitmap: Bits, levels: Levels, sides: Levels, reach: int) -> Bits:
+    """Return the coded bitmap and the offset levels and sides (-1, 0, 1) of its straight cells.
+
+    All with a border of two.
+    """
     rows, cols = bitmap.shape
     out = np.zeros(rows * cols + 16, np.uint8)
     state = np.array([0, 0xFFFFFFFF, 0], np.int64)
@@ -122,12 +142,20 @@ def encode(bitmap: Bits, levels: Levels, reach: int) -> Bits:
         for col in range(2, cols - 2):
             put_bit(state, out, tables, cell_context(bitmap, row, col), bitmap[row, col])
     shape = cell_normals(bitmap, 1.0, reach)
+    fronts = np.zeros((rows, cols, 2))
     k = -1
     for row in range(2, rows - 2):
         for col in range(2, cols - 2):
             k += bitmap[row, col]
             if not bitmap[row, col] or shape[k, 4] < STRAIGHT:
                 continue
+            context, guess = side_guess(bitmap, fronts, row, col, shape[k])
+            context = BITMAP_CONTEXTS + LEVEL_CONTEXTS + 2 * context
+            side = sides[row, col]
+            put_bit(state, out, tables, context, 1 if side == 0 else 0)
+            if side != 0:
+                put_bit(state, out, tables, context + 1, 1 if side != guess else 0)
+            fronts[row, col, 0], fronts[row, col, 1] = side * shape[k, 2], side * shape[k, 3]
             base = BITMAP_CONTEXTS + 8 * level_context(bitmap, levels, row, col)
             value = levels[row, col] + LEVELS // 2
             node = 1
@@ -143,8 +171,8 @@ def encode(bitmap: Bits, levels: Levels, reach: int) -> Bits:
 
 
 @njit(nogil=True, cache=True)
-def decode(data: Bits, bitmap: Bits, levels: Levels, reach: int) -> None:
-    """Fill bitmap and levels (both zero before) from coded data. Any data decodes to something."""
+def decode(data: Bits, bitmap: Bits, levels: Levels, sides: Levels, reach: int) -> None:
+    """Fill bitmap, levels and sides (all zero before) from coded data. Any data decodes to something."""
     rows, cols = bitmap.shape
     state = np.array([0, 0xFFFFFFFF, 4, 0], np.int64)
     for k in range(4):
@@ -154,12 +182,20 @@ def decode(data: Bits, bitmap: Bits, levels: Levels, reach: int) -> None:
         for col in range(2, cols - 2):
             bitmap[row, col] = get_bit(state, data, tables, cell_context(bitmap, row, col))
     shape = cell_normals(bitmap, 1.0, reach)
+    fronts = np.zeros((rows, cols, 2))
     k = -1
     for row in range(2, rows - 2):
         for col in range(2, cols - 2):
             k += bitmap[row, col]
             if not bitmap[row, col] or shape[k, 4] < STRAIGHT:
                 continue
+            context, guess = side_guess(bitmap, fronts, row, col, shape[k])
+            context = BITMAP_CONTEXTS + LEVEL_CONTEXTS + 2 * context
+            side = 0
+            if not get_bit(state, data, tables, context):
+                side = -guess if get_bit(state, data, tables, context + 1) else guess
+            sides[row, col] = side
+            fronts[row, col, 0], fronts[row, col, 1] = side * shape[k, 2], side * shape[k, 3]
             base = BITMAP_CONTEXTS + 8 * level_context(bitmap, levels, row, col)
             node = 1
             for _ in range(3):
@@ -169,9 +205,9 @@ def decode(data: Bits, bitmap: Bits, levels: Levels, reach: int) -> None:
 
 @njit(nogil=True, cache=True)
 def fill_bitmap(points: Values, cell: float, bitmap: Bits, means: Values) -> None:
-    """Set the cells that hold points and put the mean of each cell's points into means (rows, cols, 2).
+    """Set the cells that hold points and put the mean of each cell's points into means (rows, cols, 4).
 
-    Points are metres from the picture's centre; those outside are left out.
+    Points (N, 4) are metres from the picture's centre and whence they were seen; those outside are left out.
     """
     rows, cols = bitmap.shape
     half = (rows - 4) // 2
@@ -186,13 +222,11 @@ def fill_bitmap(points: Values, cell: float, bitmap: Bits, means: Values) -> Non
             continue
         bitmap[row, col] = 1
         counts[row, col] += 1.0
-        means[row, col, 0] += x
-        means[row, col, 1] += y
+        means[row, col] += points[k]
     for row in range(rows):
         for col in range(cols):
             if counts[row, col] > 0.0:
-                means[row, col, 0] /= counts[row, col]
-                means[row, col, 1] /= counts[row, col]
+                means[row, col] /= counts[row, col]
 
 
 @njit(nogil=True, cache=True)

@@ -104,3 +104,28 @@ def test_hits_the_window_no_longer_believes_are_left_out():
         hits.add(pose(0.2 * k, 0, 0), transform(inverse(pose(0.2 * k, 0, 0)), points))
     grid = window_of(points[points[:, 0] < 1.0])
     assert hits.around((0.0, 0.0), 6.0, grid, 50)[:, 0].max() < 1.2
+
+
+def seen_from(points, side):
+    """The same points with the direction they were seen from: along the corridor, from in front or behind."""
+    whence = np.tile([float(side), 0.0], (len(points), 1))
+    whence[np.abs(points[:, 1]) > 0.98] = 0.0  # the corridor's walls at a glance
+    return np.c_[points, whence]
+
+
+def piers(x0_m, x1_m):
+    """A corridor with piers standing out of its walls, only their faces at these ways along it."""
+    y = np.r_[np.arange(0.4, 0.98, 0.02), np.arange(-0.98, -0.4, 0.02)]
+    return np.concatenate([corridor(), np.c_[np.full_like(y, x0_m), y], np.c_[np.full_like(y, x1_m), y]])
+
+
+@pytest.mark.parametrize(("side", "off_m"), [(1.0, 0.2), (-1.0, 0.0)])
+def test_the_far_face_of_a_wall_is_not_taken_for_its_near_one(side, off_m):
+    """Driving back the robot sees the piers' other faces, 0.2 m further on; the first time it saw these."""
+    place = decode_place(encode_place(seen_from(piers(1.5, -2.5), -1.0)))
+    hits = seen_from(piers(1.5 + off_m, -2.5 + off_m), side)
+    predicted = pose(0.05, 0.02, 0.01)
+    match = match_place(place, hits, window_of(hits), (predicted, PRIOR), MatchConfig())
+    assert match.refused == ""
+    assert abs(match.T_grid_node[0] - (0.05 if off_m else 0.0)) < 0.03
+    assert abs(match.T_grid_node[1]) < 0.02

@@ -64,3 +64,18 @@ def test_any_bytes_decode_to_something_or_are_refused(data):
     except BadMap:
         return
     assert np.isfinite(boundary.points).all()
+
+
+def test_every_straight_stretch_remembers_from_which_side_it_was_seen():
+    points = office(noise_m=0.0)
+    eye = np.array([0.3, 0.2])
+    whence = eye - points
+    whence /= np.hypot(*whence.T)[:, None]
+    boundary = decode_place(encode_place(np.c_[points, whence]))
+    towards = eye - boundary.points
+    facing = np.sum(boundary.fronts * towards, axis=1) / np.hypot(*towards.T)
+    known = np.abs(boundary.fronts).max(axis=1) > 0.0
+    assert known.mean() > 0.6
+    assert (facing[known] > -0.3).all()
+    assert not decode_place(encode_place(points)).fronts.any()
+    assert len(encode_place(np.c_[points, whence])) < len(encode_place(points)) + 12
