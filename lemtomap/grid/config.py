@@ -39,6 +39,7 @@ class SlamConfig:
     degenerate_below: float = 0.18  # diversity (Appendix D) under which the weak axis follows odometry
     min_points: int = 20
     min_quality: float = 0.25  # a worse match is refused
+    new_ground_below: float = 0.25  # share of hits in cells the window knows; below it odometry leads on
     climb_below: float = 0.75  # quality under which the hill climb is tried too
     large_turn_rad: float = 0.3  # odometry that turns more between two scans is searched all round
     search_rad: float = 1.6  # how far round: the worst of the logs turns 85 degrees between two scans

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.grid.config import SlamConfig
-from lemtomap.grid.matching import Match, Matcher
+from lemtomap.grid.matching import Match, Matcher, refused
 from lemtomap.grid.matching import kernels as matching_kernels
 from lemtomap.grid.motion import Uncertainty, between, compose, odometry_uncertainty
 from lemtomap.grid.publish import SmoothCorrection
@@ -107,14 +107,16 @@ class Tracker(ABC):
         match = self._track(beams, predicted, abs(float(step[2])))
         self._quality, self._diversity, self._covariance = match.quality, match.diversity, match.covariance
         if not match.accepted:
-            return self._report(predicted, matched=False, integrated=False)
+            if self._window().known_share(beams, predicted) > self.config.new_ground_below:
+                return self._report(predicted, matched=False, integrated=False)
+            match = refused(predicted, odometry_uncertainty(self._pending, self.config))
         self._T_grid_base, self._information = match.T_grid_base, match.information
         self._pending = np.zeros(3)
         integrated = self._is_due_to_integrate(scan.stamp_s)
         if integrated:
             self._T_grid_base = self._integrate(beams, match)
             self._T_grid_integrated, self._integrated_s = self._T_grid_base, scan.stamp_s
-        return self._report(self._T_grid_base, matched=True, integrated=integrated)
+        return self._report(self._T_grid_base, matched=match.accepted, integrated=integrated)
 
     def view(self) -> GridView:
         """Return the best particle's window."""
@@ -166,7 +168,8 @@ class Tracker(ABC):
         if match.quality < config.collapse_share * self._usual_quality and not leapt:
             slipped = Uncertainty(config.search_m, config.search_rad)
             rival = self._match(beams, predicted, slipped, window, config.search_rad)
-            if rival.quality > match.quality + config.rival_gain:
+            sees_all_ways = rival.diversity >= config.degenerate_below  # a lone wall fits any other
+            if sees_all_ways and rival.quality > match.quality + config.rival_gain:
                 match = rival
         self._usual_quality += config.quality_memory * (match.quality - self._usual_quality)
         return match

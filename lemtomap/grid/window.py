@@ -10,7 +10,7 @@ from lemtomap.grid import kernels
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.scan import Beams
 from lemtomap.grid.scan import kernels as scan_kernels
-from lemtomap.se2 import Pose
+from lemtomap.se2 import Pose, transform
 from lemtomap.types import GridView
 
 UNKNOWN_PERCENT = -1
@@ -118,6 +118,19 @@ class Window:
         return not scan_kernels.outside(
             beams.hits, T_grid_base, self.arrays.origin, self.cells, self.resolution_m
         )
+
+    def known_share(self, beams: Beams, T_grid_base: Pose) -> float:
+        """Return the share of hits, 0..1, in cells that the window knows anything of; 1 without hits.
+
+        It is small on new ground, where there is nothing to match, and large where odometry is wrong.
+        """
+        if len(beams.hits) == 0:
+            return 1.0
+        n, origin = self.cells, self.arrays.origin
+        cells = np.floor(transform(T_grid_base, beams.hits) / self.resolution_m).astype(np.int64)
+        inside = cells[((cells >= origin) & (cells < origin + n)).all(axis=1)] % n
+        known = np.count_nonzero(self.arrays.evidence[inside[:, 1], inside[:, 0]])
+        return known / len(beams.hits)
 
     def centred_origin(self, T_grid_base: Pose) -> tuple[int, int]:
         """Return the origin, cells, that puts the robot in the middle."""

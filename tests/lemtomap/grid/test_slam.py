@@ -76,6 +76,17 @@ def test_without_the_diversity_gate_the_corridor_slips_as_appendix_d_says():
     assert abs(error[0]) > 0.5
 
 
+def test_after_a_stretch_with_nothing_in_sight_new_walls_are_mapped_where_odometry_says():
+    """And a lone wall is not taken for one seen before at another angle."""
+    slam = WindowMatcher(SlamConfig())
+    yard = [*box(-3.0, -2.0, 1.0, 2.0)[:3], ((20.0, -6.0), (20.0, 6.0)), *box(16.0, 4.0, 17.0, 6.0)]
+    for i, x in enumerate(np.arange(0.0, 18.0, 0.05)):
+        here = np.array([x, 0.0, 0.0])
+        update = slam.update(scan_at(here, yard, 0.1 * i), Odometry(0.1 * i, here))
+    assert update.matched
+    np.testing.assert_allclose(update.T_grid_base, here, atol=0.05)
+
+
 def test_published_correction_never_leaps_unless_flagged():
     slam = WindowMatcher(SlamConfig())
     before = None
