@@ -101,12 +101,15 @@ def plan_tour(world: World, duration_s: float, config: TourConfig | None = None,
 
 
 def plan_errand(world: World, distance_m: float, config: TourConfig | None = None) -> Tour:
-    """Return a drive to a place about distance_m away and back, twice (the thesis' navigation tasks)."""
+    """Return a drive to a place about distance_m away and back the same way, twice (the thesis' navigation
+    tasks).
+    """
     planner = RoutePlanner(world.raster)
     home = (world.spawn[0], world.spawn[1])
     lengths = {place: _length(planner.path(home, place)) for place in planner.places(home, SPACING_M * 2)}
     goal = min(lengths, key=lambda place: abs(lengths[place] - distance_m))
-    return Tour(planner.through([home, goal, home, goal, home]), config)
+    way = planner.path(home, goal)
+    return Tour(np.concatenate([way, way[::-1]] * 2), config)
 
 
 def _length(path: NDArray[np.float64]) -> float:

@@ -57,6 +57,7 @@ def test_errand_goes_there_and_back_twice(office):
     simulator.close()
     away = np.hypot(*(np.array(track) - office.spawn[:2]).T) > 5.0
     assert np.count_nonzero(np.diff(away.astype(int)) == 1) == 2
+    np.testing.assert_allclose(tour.path, tour.path[::-1])
 
 
 @pytest.mark.parametrize(
