@@ -74,8 +74,10 @@ def _orphan(
 
 
 @njit(nogil=True, cache=True)
-def _renew_normal(window: Any, gx: int, gy: int) -> None:
-    """Fit a plane through the averaged hit points around an occupied cell."""
+def _renew_normal(window: Any, gx: int, gy: int, seen_rad: float) -> None:
+    """Fit a plane through the averaged hit points around an occupied cell; where these are too few, the
+    plane is what the scan saw there, seen_rad in grid or NaN.
+    """
     evidence, mean, normal, origin = window.evidence, window.mean, window.normal, window.origin
     n = evidence.shape[0]
     cells = 0
@@ -104,6 +106,9 @@ def _renew_normal(window: Any, gx: int, gy: int) -> None:
                 syy += w * y * y
     normal[gy % n, gx % n] = NONE
     if cells < MIN_PLANE_POINTS:
+        if not math.isnan(seen_rad):
+            normal[gy % n, gx % n] = int(seen_rad % math.pi * 255.0 / math.pi + 0.5) % 255
+            window.lift[gy % n, gx % n] = 0
         return
     sxx = sxx / k - sx / k * sx / k
     sxy = sxy / k - sx / k * sy / k
@@ -195,6 +200,7 @@ def integrate(
     mark: Array,
     tag: int,
     hits: Array,
+    normals_rad: Array,
     cuts: Array,
     T_grid_base: Array,
     laser: Array,
@@ -212,7 +218,7 @@ def integrate(
     n = evidence.shape[0]
     hit, miss, floor, ceiling, bound = rules[0], rules[1], rules[2], rules[3], rules[4]
     c, s = math.cos(T_grid_base[2]), math.sin(T_grid_base[2])
-    touched, lost, orphans = scratch[0], scratch[1], scratch[2]
+    touched, lost, orphans = np.empty(hits.shape[0], dtype=np.int64), scratch[0], scratch[1]
     touched_count = lost_count = orphan_count = 0
     for i in range(hits.shape[0]):
         x = T_grid_base[0] + c * hits[i, 0] - s * hits[i, 1]
@@ -228,7 +234,7 @@ def integrate(
             if after == 0:
                 after = 1
             evidence[row, col] = after
-            touched[touched_count, 0], touched[touched_count, 1] = gx, gy
+            touched[touched_count] = i
             touched_count += 1
             if before <= 0:
                 averaged[row, col] = 0
@@ -253,9 +259,11 @@ def integrate(
     for i in range(orphan_count):
         _renew_nearest(evidence, nearest, offsets, n, origin, orphans[i, 0], orphans[i, 1])
     for i in range(touched_count):
-        gx, gy = touched[i, 0], touched[i, 1]
+        k = touched[i]
+        gx = math.floor((T_grid_base[0] + c * hits[k, 0] - s * hits[k, 1]) / resolution)
+        gy = math.floor((T_grid_base[1] + s * hits[k, 0] + c * hits[k, 1]) / resolution)
         if evidence[gy % n, gx % n] > 0:
-            _renew_normal(window, gx, gy)
+            _renew_normal(window, gx, gy, normals_rad[k] + T_grid_base[2])
 
 
 @njit(nogil=True, cache=True)

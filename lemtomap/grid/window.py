@@ -153,6 +153,7 @@ class Window:
             self._scratch.mark,
             self._scratch.tag,
             beams.hits,
+            beams.normals_rad,
             beams.cuts,
             T_grid_base,
             beams.laser_base,

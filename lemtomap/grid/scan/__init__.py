@@ -18,6 +18,8 @@ class Beams:
 
     hits: NDArray[np.float32]
     """float32 (M, 2), metres."""
+    normals_rad: NDArray[np.float32]
+    """float32 (M,): direction across the surface at each hit, 0..pi; NaN where none is seen."""
     cuts: NDArray[np.float32]
     """float32 (C, 2), metres: where beams that saw nothing near are cut."""
     laser_base: NDArray[np.float64]
@@ -48,4 +50,6 @@ class ScanPreparer:
             points[0],
             points[1],
         )
-        return Beams(points[0, :hits], points[1, :cuts], scan.T_base_laser)
+        normals_rad = np.empty(hits, dtype=np.float32)
+        kernels.surface_normals(points[0, :hits], normals_rad)
+        return Beams(points[0, :hits], normals_rad, points[1, :cuts], scan.T_base_laser)

@@ -8,6 +8,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
+NEIGHBOURS = 12  # beams to either side in which an arm is looked for
+LEAST_ARM_M, MOST_ARM_M = 0.1, 2.0
+MOST_ARM_RATIO = 3.0  # a jump in depth makes one arm far longer than the other
+MOST_OFF_M = 0.03  # from the line through its neighbours
+
 
 @njit(nogil=True, cache=True)
 def prepare_scan(
@@ -53,6 +58,38 @@ def prepare_scan(
             cuts[cut_count, 0], cuts[cut_count, 1] = x, y
             cut_count += 1
     return hit_count, cut_count
+
+
+@njit(nogil=True, cache=True)
+def surface_normals(hits: Array, normals: Array) -> None:
+    """Write the direction (0..pi, base) across the surface at each hit, NaN where its neighbours do not lie
+    on one line with it at like distances.
+    """
+    count = hits.shape[0]
+    for i in range(count):
+        normals[i] = math.nan
+        x, y = hits[i, 0], hits[i, 1]
+        left = right = -1.0
+        lx = ly = rx = ry = 0.0
+        for j in range(i - 1, max(i - NEIGHBOURS, 0) - 1, -1):
+            lx, ly = hits[j, 0] - x, hits[j, 1] - y
+            left = math.hypot(lx, ly)
+            if left >= LEAST_ARM_M:
+                break
+        for j in range(i + 1, min(i + NEIGHBOURS, count - 1) + 1):
+            rx, ry = hits[j, 0] - x, hits[j, 1] - y
+            right = math.hypot(rx, ry)
+            if right >= LEAST_ARM_M:
+                break
+        if min(left, right) < LEAST_ARM_M or max(left, right) > MOST_ARM_RATIO * min(left, right):
+            continue
+        along_x, along_y = rx - lx, ry - ly
+        chord = math.hypot(along_x, along_y)
+        if max(left, right) > MOST_ARM_M or chord <= max(left, right):
+            continue
+        if abs(lx * ry - ly * rx) > MOST_OFF_M * chord:
+            continue
+        normals[i] = (math.atan2(along_y, along_x) + 0.5 * math.pi) % math.pi
 
 
 @njit(nogil=True, cache=True)
