@@ -90,6 +90,7 @@ class Matcher:
             return refused(prior, uncertainty)
         kernels.match(
             beams.hits,
+            beams.normals_rad,
             prior,
             (1.0 / uncertainty.sigma_m**2, 1.0 / uncertainty.sigma_rad**2),
             window.arrays,

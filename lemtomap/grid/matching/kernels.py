@@ -22,7 +22,7 @@ LIFTS = 254.0
 
 @njit(nogil=True, cache=True)
 def _linearise(
-    points: Array, pose: Array, window: Any, tables: Any, rules: Any, sigma: float, H: Array, b: Array
+    points: Array, normals_rad: Array, pose: Array, window: Any, tables: Any, rules: Any, sigma: float, H: Array, b: Array
 ) -> float:
     """Sum the normal equations of the match at pose; return (weight of matched points, weighted surface
     spread).
@@ -80,6 +80,9 @@ def _linearise(
             off = window.lift[at_row, at_col] * per_lift
             ex += off * nx
             ey += off * ny
+            wxx, wxy, wyy = w * nx * nx, w * nx * ny, w * ny * ny
+        elif not math.isnan(normals_rad[i]):
+            nx, ny = math.cos(normals_rad[i] + pose[2]), math.sin(normals_rad[i] + pose[2])
             wxx, wxy, wyy = w * nx * nx, w * nx * ny, w * ny * ny
         else:
             wxx = wyy = point_weight * w
@@ -264,6 +267,7 @@ def _sweep(
 @njit(nogil=True, cache=True)
 def _refine(
     points: Array,
+    normals_rad: Array,
     pose: Array,
     prior: Array,
     prior_info: Pair,
@@ -283,7 +287,7 @@ def _refine(
     sigma = rules.sigma_m
     width = 2.0 * sigma
     for _ in range(rules.newton_rounds):
-        total = _linearise(points, pose, window, tables, rules, width, H, b)
+        total = _linearise(points, normals_rad, pose, window, tables, rules, width, H, b)
         _gate(H, b, rules.degenerate_below)
         dx, dy = prior[0] - pose[0], prior[1] - pose[1]
         dt = (prior[2] - pose[2] + math.pi) % (2.0 * math.pi) - math.pi
@@ -307,7 +311,7 @@ def _refine(
             width = max(sigma, 0.5 * width)
         elif small:
             break
-    total = _linearise(points, pose, window, tables, rules, sigma, H, b)
+    total = _linearise(points, normals_rad, pose, window, tables, rules, sigma, H, b)
     diversity = _gate(H, b, rules.degenerate_below)
     for i in range(3):
         for j in range(3):
@@ -318,6 +322,7 @@ def _refine(
 @njit(nogil=True, cache=True)
 def match(
     points: Array,
+    normals_rad: Array,
     prior: Array,
     prior_info: Pair,
     window: Any,
@@ -335,7 +340,7 @@ def match(
     """
     pose, H, covariance = out[0:3], out[3:12].reshape(3, 3), out[12:21].reshape(3, 3)
     pose[:] = prior
-    quality, diversity = _refine(points, pose, prior, prior_info, window, tables, rules, H)
+    quality, diversity = _refine(points, normals_rad, pose, prior, prior_info, window, tables, rules, H)
     if quality < rules.climb_below or reach_rad > 0.0:
         rival = prior.copy()
         rival_H = np.empty((3, 3))
@@ -343,7 +348,7 @@ def match(
             _sweep(points, rival, prior, prior_info, window, tables, rules, reach_rad, reach_m)
         _climb(points, rival, prior, prior_info, window, tables, rules)
         rival_quality, rival_diversity = _refine(
-            points, rival, prior, prior_info, window, tables, rules, rival_H
+            points, normals_rad, rival, prior, prior_info, window, tables, rules, rival_H
         )
         if rival_quality > quality:
             pose[:] = rival
