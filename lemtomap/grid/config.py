@@ -36,7 +36,7 @@ class SlamConfig:
     match_sigma_m: float = 0.05  # reach of the robust weight
     match_noise_m: float = 0.04  # of one beam, widened because beams err together
     point_weight: float = 0.8  # of a hit that lies on no plane, against one that does
-    degenerate_below: float = 0.18  # diversity (Appendix D) under which the weak axis follows odometry
+    degenerate_below: float = 0.08  # diversity (Appendix D) under which the weak axis follows odometry
     min_points: int = 20
     min_quality: float = 0.25  # a worse match is refused
     new_ground_below: float = 0.25  # share of hits in cells the window knows; below it odometry leads on
@@ -56,6 +56,11 @@ class SlamConfig:
     odometry_rad_per_rad: float = 0.2
     odometry_m_per_rad: float = 0.02
     odometry_rad_per_m: float = 0.1
+
+    # what matches teach about the wheels, as a factor on the translation's standard deviation
+    trust_memory: float = 0.01  # share of the newest match
+    trust_least: float = 1.0
+    trust_most: float = 4.0
 
     # drift of the window's frame: after so much travel or turning it is off by the error of one more match
     renew_m: float = 1.2

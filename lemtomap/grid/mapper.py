@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.matching import Match, Matcher, refused
 from lemtomap.grid.matching import kernels as matching_kernels
-from lemtomap.grid.motion import Uncertainty, between, compose, odometry_uncertainty
+from lemtomap.grid.motion import Uncertainty, WheelTrust, between, compose, odometry_uncertainty
 from lemtomap.grid.publish import SmoothCorrection
 from lemtomap.grid.scan import Beams, ScanPreparer
 from lemtomap.grid.window import Scratch, Window, look_up
@@ -54,6 +54,7 @@ class Tracker(ABC):
         self._scratch = Scratch(config.cells)
         self._match = Matcher(config, self._tables)
         self._prepare = ScanPreparer()
+        self._trust = WheelTrust(config)
         self._correction = SmoothCorrection(config)
         self._T_grid_base: Pose | None = None
         self._beams: Beams | None = None
@@ -162,7 +163,8 @@ class Tracker(ABC):
         nowhere.
         """
         config, window = self.config, self._window()
-        uncertainty = odometry_uncertainty(self._pending, config)
+        expected = odometry_uncertainty(self._pending, config)
+        uncertainty = self._trust.widen(expected)
         leapt = turn_rad > config.large_turn_rad
         match = self._match(beams, predicted, uncertainty, window, config.search_rad if leapt else 0.0)
         if match.quality < config.collapse_share * self._usual_quality and not leapt:
@@ -171,6 +173,9 @@ class Tracker(ABC):
             sees_all_ways = rival.diversity >= config.degenerate_below  # a lone wall fits any other
             if sees_all_ways and rival.quality > match.quality + config.rival_gain:
                 match = rival
+        elif match.accepted and math.hypot(self._pending[0], self._pending[1]) > config.match_distance_m:
+            change = match.T_grid_base - predicted
+            self._trust.learn(change, float(predicted[2]), match.information, expected)
         self._usual_quality += config.quality_memory * (match.quality - self._usual_quality)
         return match
 

@@ -4,9 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lemtomap.grid.config import SlamConfig
 from lemtomap.se2 import Pose
+
+SEES_WELL = 0.8  # share of the scan in a match along the way, from which on it judges the odometry
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,3 +46,35 @@ def odometry_uncertainty(step: Pose, config: SlamConfig) -> Uncertainty:
         config.odometry_floor_m + config.odometry_m_per_m * way + config.odometry_m_per_rad * turn,
         config.odometry_floor_rad + config.odometry_rad_per_rad * turn + config.odometry_rad_per_m * way,
     )
+
+
+class WheelTrust:
+    """Learns from the matches how much farther off this robot's odometry is along its way than the settings
+    say: slipping wheels, and stamps that do not fit the scans.
+    """
+
+    def __init__(self, config: SlamConfig) -> None:
+        self._memory = config.trust_memory
+        self._bounds = config.trust_least**2, config.trust_most**2
+        self._variance_ratio = 1.0
+
+    def widen(self, uncertainty: Uncertainty) -> Uncertainty:
+        """Return the uncertainty of a step as experience has it."""
+        return Uncertainty(math.sqrt(self._variance_ratio) * uncertainty.sigma_m, uncertainty.sigma_rad)
+
+    def learn(
+        self, correction: Pose, heading_rad: float, information: NDArray[np.float64], uncertainty: Uncertainty
+    ) -> None:
+        """Take what a match changed of its prediction; information float64 (3, 3) of the scan alone, both in
+        grid. Only a scan that sees well along the way has a say. uncertainty: as the settings have it.
+        """
+        x, y = math.cos(heading_rad), math.sin(heading_rad)
+        seen = x * x * information[0, 0] + 2.0 * x * y * information[0, 1] + y * y * information[1, 1]
+        share = float(seen / (seen + 1.0 / self.widen(uncertainty).sigma_m ** 2))
+        if share < SEES_WELL:
+            return
+        innovation_m = float(x * correction[0] + y * correction[1]) / share
+        least, most = self._bounds
+        ratio = min((innovation_m / uncertainty.sigma_m) ** 2, 4.0 * most)
+        self._variance_ratio += self._memory * (ratio - self._variance_ratio)
+        self._variance_ratio = min(max(self._variance_ratio, least), most)

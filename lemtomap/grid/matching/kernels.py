@@ -22,7 +22,15 @@ LIFTS = 254.0
 
 @njit(nogil=True, cache=True)
 def _linearise(
-    points: Array, normals_rad: Array, pose: Array, window: Any, tables: Any, rules: Any, sigma: float, H: Array, b: Array
+    points: Array,
+    normals_rad: Array,
+    pose: Array,
+    window: Any,
+    tables: Any,
+    rules: Any,
+    sigma: float,
+    H: Array,
+    b: Array,
 ) -> float:
     """Sum the normal equations of the match at pose; return (weight of matched points, weighted surface
     spread).

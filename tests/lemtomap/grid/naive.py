@@ -76,3 +76,26 @@ def closeness_score(points, pose, cells, reach_m, resolution):
         gap = nearest_distance(cells, (gx, gy), 8.9)
         total += math.exp(-0.5 * (gap * resolution / reach_m) ** 2)
     return total / len(points)
+
+
+def surface_normals(hits):
+    """Return the direction across the line through the nearest neighbours 0.1 m off to either side, NaN where
+    they are missing, unlike in distance, or off the line.
+    """
+    normals = []
+    for i, hit in enumerate(hits):
+        arms = []
+        for side in (range(i - 1, max(i - 13, -1), -1), range(i + 1, min(i + 13, len(hits)))):
+            arms += [hits[j] - hit for j in side if math.dist(hits[j], hit) >= 0.1][:1]
+        normals.append(_across(*arms) if len(arms) == 2 else math.nan)
+    return np.array(normals)
+
+
+def _across(left, right):
+    short, long = sorted((math.hypot(*left), math.hypot(*right)))
+    chord = right - left
+    length = math.hypot(*chord)
+    if long > 2.0 or long > 3.0 * short or length <= long:
+        return math.nan
+    off_m = abs(left[0] * right[1] - left[1] * right[0]) / length
+    return math.nan if off_m > 0.03 else math.atan2(chord[1], chord[0]) + math.pi / 2
