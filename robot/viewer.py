@@ -229,9 +229,10 @@ class Viewer:
 
     def _log_costmap(self, costmap: CostmapView) -> None:
         """Log the costmap as a veil over the window: clear where driving is free or nothing is known."""
-        rows, cols = costmap.cost.shape
+        cost = costmap.paint()
+        rows, cols = cost.shape
         veil = rr.GridMap(
-            data=np.flipud(COST_COLOURS[costmap.cost]).tobytes(),
+            data=np.flipud(COST_COLOURS[cost]).tobytes(),
             format=rr.components.ImageFormat(
                 width=cols, height=rows, color_model="RGBA", channel_datatype="U8"
             ),

@@ -97,7 +97,8 @@ class NavConfig:
     route: RouteConfig = field(default_factory=RouteConfig)
     recovery: RecoveryConfig = field(default_factory=RecoveryConfig)
     period_s: float = 0.1  # control cycle, design section 4
-    plan_period_s: float = 0.2  # the field towards the metric goal is renewed this often
+    plan_period_s: float = 0.2  # the field near the robot is renewed this often, as the thesis' local costmap
+    look_period_s: float = 1.0  # and the one over the whole window; the thesis' global plan: 1 Hz
     goal_tolerance_m: float = 0.12  # thesis' DWA setting: 0.15
     yaw_tolerance_rad: float = 0.10
     turn_start_rad: float = 1.05  # turn in place when the way starts further off than this (60 degrees)

@@ -57,14 +57,32 @@ class Costs:
             cost[row, col] = self.cost[row, col]
         return replace(self, cost=cost)
 
+    def part(self, inner: tuple[slice, slice], outer: tuple[slice, slice]) -> "Costs":
+        """Return the costs of a part of the window; outer is the part of the window this is of."""
+        row, col = inner[0].start - outer[0].start, inner[1].start - outer[1].start
+        cut = (
+            slice(row, row + inner[0].stop - inner[0].start),
+            slice(col, col + inner[1].stop - inner[1].start),
+        )
+        origin_m = self.origin_m[0] + col * self.resolution_m, self.origin_m[1] + row * self.resolution_m
+        return Costs(
+            self.stamp_s,
+            self.resolution_m,
+            origin_m,
+            np.ascontiguousarray(self.state[cut]),
+            np.ascontiguousarray(self.clearance[cut]),
+            np.ascontiguousarray(self.cost[cut]),
+        )
+
     def view(self) -> CostmapView:
-        """Return the picture viewers show."""
+        """Return the picture viewers show, painted when it is looked at."""
+        return CostmapView(self.stamp_s, self.resolution_m, self.origin_m, self._paint)
+
+    def _paint(self) -> NDArray[np.uint8]:
         picture = np.where(np.isinf(self.cost), 253.0, np.clip((self.cost - 1.0) * 50.0, 0.0, 252.0))
         picture[self.state == kernels.UNKNOWN] = 255
         picture[self.state == kernels.LETHAL] = 254
-        cost = picture.astype(np.uint8)
-        cost.setflags(write=False)
-        return CostmapView(self.stamp_s, cost, self.resolution_m, self.origin_m)
+        return picture.astype(np.uint8)
 
 
 class LiveLayer:
@@ -148,33 +166,51 @@ class Costmap:
         self._live.clear()
 
     def build(
-        self, now_s: float, hazards_grid: Points, p_robot_grid: ArrayLike, *, tight: bool = False
+        self,
+        now_s: float,
+        hazards_grid: Points,
+        p_robot_grid: ArrayLike,
+        *,
+        tight: bool = False,
+        half_m: float | None = None,
     ) -> Costs:
         """Return the costmap of this moment. hazards_grid: float64 (N, 2), metres, what was met by touch.
 
         tight: without the margin, for a place that a few noisy cells make too narrow.
+        half_m: only the square of twice this side around the robot; what stands outside it near its border is
+        felt as well.
         """
         grid, config = self._grid, self._config
         if grid is None:
             raise RuntimeError("build before follow_window")
-        state = np.empty(grid.occupancy.shape, dtype=np.uint8)
-        kernels.classify(grid.occupancy, config.occupied_percent, state)
-        for layer in self._live.values():
-            kernels.add_live(state, layer.last_hit_s, layer.hits, now_s, layer.decay_s, config.live_hits)
-        res = grid.resolution_m
-        for row, col in self._cells(hazards_grid):
+        res, felt_m = grid.resolution_m, config.inflation_m + self._body.radius_m
+        part = _square(grid, p_robot_grid, None if half_m is None else half_m + felt_m)
+        origin_m = grid.origin_m[0] + part[1].start * res, grid.origin_m[1] + part[0].start * res
+        state = self._state(grid, part, now_s)
+        for x, y in hazards_grid:
+            row, col = (y - origin_m[1]) / res, (x - origin_m[0]) / res
             kernels.stamp_disc(state, row, col, config.contact_radius_m / res, kernels.LETHAL)
-        reach = (config.inflation_m + self._body.radius_m) / res
-        clearance = kernels.clearance_transform(state, reach)
+        clearance = kernels.clearance_transform(state, felt_m / res)
         body = (self._body.radius_m + (0.0 if tight else config.margin_m)) / res
         cost = kernels.traversal_cost(
             state, clearance, body, config.near_wall_cost, config.falloff_m / res, config.unknown_factor
         )
-        costs = Costs(now_s, res, grid.origin_m, state, clearance, cost)
+        costs = Costs(now_s, res, origin_m, state, clearance, cost)
         row, col = costs.cell(p_robot_grid)
         if costs.holds(p_robot_grid) and np.isinf(cost[int(row), int(col)]):
             kernels.open_start(cost, clearance, row, col, 0.30 / res, TIGHT_COST)
-        return costs
+        return costs if half_m is None else costs.part(_square(grid, p_robot_grid, half_m), part)
+
+    def _state(self, grid: GridView, part: tuple[slice, slice], now_s: float) -> NDArray[np.uint8]:
+        """Return FREE, UNKNOWN or LETHAL of the window and the live layers, in this part of it."""
+        occupancy = np.ascontiguousarray(grid.occupancy[part])
+        state = np.empty(occupancy.shape, dtype=np.uint8)
+        kernels.classify(occupancy, self._config.occupied_percent, state)
+        for layer in self._live.values():
+            last_hit_s = np.ascontiguousarray(layer.last_hit_s[part])
+            hits = np.ascontiguousarray(layer.hits[part])
+            kernels.add_live(state, last_hit_s, hits, now_s, layer.decay_s, self._config.live_hits)
+        return state
 
     @property
     def _resolution_m(self) -> float:
@@ -186,3 +222,17 @@ class Costmap:
         if grid is None:
             raise RuntimeError("no window yet")
         return np.asarray((p_grid - np.array(grid.origin_m))[:, ::-1] / grid.resolution_m)
+
+
+def _square(grid: GridView, p_grid: ArrayLike, half_m: float | None) -> tuple[slice, slice]:
+    """Return the rows and columns of a square around a point, as far as the window has them."""
+    rows, cols = grid.occupancy.shape
+    if half_m is None:
+        return slice(0, rows), slice(0, cols)
+    middle = (np.asarray(p_grid, dtype=np.float64)[:2] - np.array(grid.origin_m)) / grid.resolution_m
+    half = round(half_m / grid.resolution_m)
+    col, row = (int(v) for v in np.clip(np.floor(middle), 0, (cols - 1, rows - 1)))
+    return (
+        slice(max(0, row - half), min(rows, row + half + 1)),
+        slice(max(0, col - half), min(cols, col + half + 1)),
+    )

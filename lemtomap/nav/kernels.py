@@ -65,11 +65,11 @@ def clear_cells(last_hit_s: F8, hits: U1, rows: F8, cols: F8) -> None:
 
 @njit(nogil=True, cache=True)
 def mark_hits(last_hit_s: F8, hits: U1, rows: F8, cols: F8, now_s: float) -> None:
-    """Count one hit per cell and scan."""
+    """Count one hit per cell and scan; a cell that is believed for longer anyway stays so."""
     height, width = last_hit_s.shape
     for i in range(rows.size):
         r, c = int(np.floor(rows[i])), int(np.floor(cols[i]))
-        if r < 0 or c < 0 or r >= height or c >= width or last_hit_s[r, c] == now_s:
+        if r < 0 or c < 0 or r >= height or c >= width or last_hit_s[r, c] >= now_s:
             continue
         last_hit_s[r, c] = now_s
         if hits[r, c] < 100:

@@ -1,4 +1,8 @@
-"""The metric planner: what of the window the robot can reach, and the cost-to-go to a target in it."""
+"""The metric planner: what of the window the robot can reach, and the cost-to-go to a target in it.
+
+Far plans cover the window and are made now and then. Near plans cover a few metres around the robot and are
+made often: what lies beyond their border is worth what the last far plan says.
+"""
 
 from dataclasses import dataclass
 
@@ -84,6 +88,48 @@ def plan_to(costs: Costs, p_robot_grid: ArrayLike, target_cell: tuple[int, int])
     length = float(np.hypot(*np.diff(path, axis=0).T).sum()) if len(path) > 1 else 0.0
     target = costs.to_grid(np.array([[target_cell[0] + 0.5, target_cell[1] + 0.5]]))[0]
     return MetricPlan(costs, field, path, length, (float(target[0]), float(target[1])))
+
+
+def plan_near(near: Costs, far: MetricPlan, p_robot_grid: ArrayLike) -> MetricPlan | None:
+    """Return the way to the far plan's target through newer costs around the robot, or None if there is none.
+
+    near: a part of the window on the cells of the far plan's, with the robot inside.
+    """
+    seeds, values = _border(near, far)
+    if not seeds.size:
+        return None
+    row, col = near.cell(p_robot_grid)
+    stop = int(np.floor(row)) * near.state.shape[1] + int(np.floor(col))
+    margin = FIELD_MARGIN_M / near.resolution_m
+    field = kernels.march(near.cost, seeds, values, stop, margin, top_cost(near))
+    if not np.isfinite(field[int(np.floor(row)), int(np.floor(col))]):
+        return None
+    path = near.to_grid(kernels.descend(field, row, col, 1.0, 2 * sum(near.state.shape)))
+    beyond = kernels.descend(far.field, *far.costs.cell(path[-1]), 1.0, 2 * sum(far.field.shape))
+    path = np.vstack([path, far.costs.to_grid(beyond[1:])])
+    length = float(np.hypot(*np.diff(path, axis=0).T).sum()) if len(path) > 1 else 0.0
+    return MetricPlan(near, field, path, length, far.p_target_grid)
+
+
+def _border(near: Costs, far: MetricPlan) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the cells where a near plan joins the far one, flat indices (N,), and their cost-to-go (N,).
+
+    These are the border of the near part, and the target if it lies inside.
+    """
+    rows, cols = near.state.shape
+    edge = np.zeros((rows, cols), dtype=bool)
+    edge[[0, -1], :] = edge[:, [0, -1]] = True
+    r, c = np.nonzero(edge & np.isfinite(near.cost))
+    if near.holds(far.p_target_grid):
+        row, col = near.cell(far.p_target_grid)
+        r, c = np.append(r, int(row)), np.append(c, int(col))
+    row0, col0 = (round(v) for v in far.costs.cell(near.origin_m))
+    inside = (r + row0 >= 0) & (r + row0 < far.field.shape[0])
+    inside &= (c + col0 >= 0) & (c + col0 < far.field.shape[1])
+    r, c = r[inside], c[inside]
+    value = far.field[r + row0, c + col0].astype(np.float64)
+    known = np.isfinite(value)
+    return (r * cols + c)[known], value[known]
 
 
 def top_cost(costs: Costs) -> float:

@@ -1,11 +1,11 @@
 """The navigator: first topological, then metric, then a velocity (thesis, 3-5; one object instead of three).
 
-    goal -> route over nodes -> sliding metric goal -> field in the window -> DWA -> raw points -> twist
+    goal -> route over nodes -> sliding metric goal -> field in the window -> field near by -> DWA -> raw points
 
 `step` is called at control rate and never waits; each call says what it does and, when it cannot, why.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from lemtomap import se2
 from lemtomap.errors import NoRoute
 from lemtomap.nav.config import NavConfig
-from lemtomap.nav.costmap import Costs
 from lemtomap.nav.follower import Follower, Motion, Step
-from lemtomap.nav.metric import MetricPlan, Reach, plan_to, reach_from
+from lemtomap.nav.metric import MetricPlan
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
+from lemtomap.nav.outlook import FarLook, Outlook, WindowLook, look_near, outdated
 from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.sliding import Target, choose_target, find_barrier, place_of
+from lemtomap.nav.sliding import Target, place_of
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
     Contact,
@@ -35,7 +35,7 @@ from lemtomap.nav.types import (
 from lemtomap.nav.watching import EdgeClock
 from lemtomap.nav.way import Moment, WayKeeper
 from lemtomap.se2 import Pose
-from lemtomap.types import MapView, RouteGraph, Twist
+from lemtomap.types import MapView, RouteEdge, RouteGraph, Twist
 
 BUMP_BACK_M = 0.15
 AT_NODE_M = 0.5
@@ -46,17 +46,19 @@ REST = Twist(0.0, 0.0)
 class Navigator:
     """Drives to goals, one at a time; a new goal replaces the old one without a stop."""
 
-    def __init__(self, config: NavConfig | None = None) -> None:
+    def __init__(
+        self, config: NavConfig | None = None, far: Callable[[Surroundings], FarLook] = WindowLook
+    ) -> None:
         self.config = config or NavConfig()
         self.surroundings = Surroundings(self.config)
-        self.costs: Costs | None = None
-        """The newest costmap, for whoever wants to see or use it."""
+        self._far = far(self.surroundings)
+        self._outlook: Outlook | None = None
+        """What the last far look found; None: look anew."""
         self._costmap_view: CostmapView | None = None
         self._goal: Goal | None = None
         self._end: tuple[NavState, Reason, str] = (NavState.IDLE, Reason.NONE, "no goal")
         self._way = WayKeeper(self.config)
         self._plan: MetricPlan | None = None
-        self._target: Target | None = None
         self._planned_s = -np.inf
         self._lost_s: float | None = None
         self._waiting_s: float | None = None
@@ -82,9 +84,8 @@ class Navigator:
         """
         stayed = self._goal is not None and self._way_back.stayed_m < STAYED_M
         self._goal = Goal(goal) if isinstance(goal, int) else goal
-        self._way.route, self._plan, self._target = None, None, None
+        self._way.route, self._plan, self._outlook = None, None, None
         self._waiting_s = self._lost_s = self._shut_since_s = None
-        self._planned_s = -np.inf
         self._follower.restart()
         if stayed:
             self._progress.move_goal()
@@ -145,7 +146,7 @@ class Navigator:
             moment.events.append(self.surroundings.touch(contact, moment.map_view, moment.T_grid_base))
         if bumps and self._goal is not None:
             self._ladder.back_off(moment.T_odom_base, moment.now_s, BUMP_BACK_M)
-            self._planned_s = -np.inf
+            self._outlook = None
 
     # ---- one cycle with a goal ----
 
@@ -158,60 +159,55 @@ class Navigator:
             return self._rest(moment)
         try:
             route = self._way.keep(goal, moment)
+            self._look(goal, route, moment)
         except NoRoute as error:
             return self._fail(moment, Reason.NO_ROUTE, str(error))
-        if moment.now_s - self._planned_s >= self.config.plan_period_s - 1e-6 or self._plan is None:
-            self._replan(goal, route, moment)
-            if self._way.route is None:  # an edge was closed: look for another way at once
-                return self._act(moment)
+        if self._way.route is None:  # an edge was closed: look for another way at once
+            return self._act(moment)
         if self._goal_is_shut(route, moment):
             return self._fail(moment, Reason.BLOCKED, f"the goal is out of reach from node {route.nodes[-1]}")
         recovering = self._recover_step(moment)
         return self._go(route, moment) if recovering is None else recovering
 
     def _go(self, route: Route, moment: Moment) -> NavOutput:
-        if self._plan is None or self._target is None:
+        target = self._target
+        if self._plan is None or target is None:
             return self._no_way(route, moment)
         self._waiting_s = None
-        return self._drive(route, self._plan, self._target, moment)
+        return self._drive(route, self._plan, target, moment)
 
-    def _replan(self, goal: Goal, route: Route, moment: Moment) -> None:
-        """Renew costmap, reachable part, sliding goal and the field towards it."""
-        view = moment.map_view
+    @property
+    def _target(self) -> Target | None:
+        return None if self._outlook is None else self._outlook.target
+
+    def _look(self, goal: Goal, route: Route, moment: Moment) -> None:
+        """Renew what is known of the way, near by often, over the whole window when it is time."""
+        outlook = self._outlook
+        if outlook is not None and moment.now_s - self._planned_s < self.config.plan_period_s - 1e-6:
+            return
         self._planned_s = moment.now_s
-        reach, self._target = self._look(goal, route, moment, tight=False)
-        beyond = 0 if self._target is None else self._target.index
-        if self._target is None or find_barrier(route, view.T_grid_node, reach, beyond) is not None:
-            narrow, further = self._look(goal, route, moment, tight=True)
-            if further is not None and (self._target is None or further.index > beyond):
-                reach, self._target = narrow, further
-        self.costs = costs = reach.costs
-        self._costmap_view = costs.view()
-        self._plan = None
-        if self._target is not None:
-            self._plan = plan_to(costs, moment.T_grid_base, self._target.cell)
-        self._way.barriers.remember(self.surroundings.hits_grid(view.T_grid_odom), moment.now_s)
-        shut_at = self._way.check(goal, self._target, self._plan, reach, moment)
-        if shut_at is not None:
-            self.surroundings.hold(shut_at, moment.now_s + self.config.recovery.block_s)
-            self._start_over(moment.now_s)
-
-    def _look(self, goal: Goal, route: Route, moment: Moment, *, tight: bool) -> tuple[Reach, Target | None]:
-        """Return what can be reached now, and the furthest place of the route in it."""
-        view = moment.map_view
-        costs = self.surroundings.costs(view, moment.T_grid_base, moment.now_s, tight=tight)
-        reach = reach_from(costs, moment.T_grid_base)
-        return reach, choose_target(route, goal, view.T_grid_node, reach, self._tolerance_m())
+        self._way.barriers.remember(self.surroundings.hits_grid(moment.map_view.T_grid_odom), moment.now_s)
+        near = None if outlook is None else look_near(self.surroundings, outlook, moment)
+        if outlook is None or self._way.barriers.watching or outdated(outlook, near, route, moment, self.config):
+            outlook = self._outlook = self._far.look(goal, route, moment, self._tolerance_m())
+            self._costmap_view = outlook.reach.costs.view()
+            near = look_near(self.surroundings, outlook, moment)
+            shut_at = self._way.check(goal, outlook.target, outlook.plan, outlook.reach, moment)
+            if shut_at is not None:
+                self.surroundings.hold(shut_at, moment.now_s + self.config.recovery.block_s)
+                self._start_over(moment.now_s)
+                return
+        self._plan = outlook.plan if near is None else near
 
     def _start_over(self, now_s: float) -> None:
         """The way is another one now: what was measured along the old one no longer counts."""
-        self._plan, self._target, self._waiting_s = None, None, None
+        self._plan, self._outlook, self._waiting_s = None, None, None
         self._progress.restart(now_s)
 
     def _goal_is_shut(self, route: Route, moment: Moment) -> bool:
         """Tell whether the robot has stood at the goal's node for a while with no way to the goal itself."""
         target, at_node = self._target, False
-        if target is not None and not target.final and target.index == len(route.nodes) - 1:
+        if target is not None and not target.final and target.node_id == route.nodes[-1]:
             place = moment.map_view.T_grid_node.get(target.node_id)
             at_node = place is not None and float(np.hypot(*(place - moment.T_grid_base)[:2])) < AT_NODE_M
         if not at_node:
@@ -232,7 +228,7 @@ class Navigator:
                 return self._output(moment, REST, *self._end)
         else:
             step = self._follower.step(plan, moment.T_grid_base, moment.twist, end_m)
-        remaining_m = plan.length_m + sum(edge.length_m for edge in route.edges[target.index :])
+        remaining_m = plan.length_m + sum(edge.length_m for edge in self._beyond(route))
         if self._progress.stuck(remaining_m, moment.now_s):
             return self._climb(moment)
         self._ladder.relax(self._progress.take_gain())
@@ -245,7 +241,7 @@ class Navigator:
         reason = (
             Reason.OBSTACLE if step.motion == Motion.STUCK or twist.v_mps < step.twist.v_mps else Reason.NONE
         )
-        rest = route.edges[target.index :]
+        rest = self._beyond(route)
         remaining_m = plan.length_m + sum(edge.length_m for edge in rest)
         speed_mps = self.config.route.usual_speed_mps
         expected_s = plan.length_m / speed_mps + sum(edge.time_s for edge in rest)
@@ -254,6 +250,11 @@ class Navigator:
             remaining_m=remaining_m,
             expected_s=expected_s,
         )
+
+    def _beyond(self, route: Route) -> Sequence[RouteEdge]:
+        """Return the edges of the route behind the present target."""
+        at = None if self._outlook is None else self._outlook.index_in(route)
+        return () if at is None else route.edges[at:]
 
     def _way_to_end(self, plan: MetricPlan, T_grid_base: Pose) -> float:
         away_m = float(np.hypot(*(np.array(plan.p_target_grid) - T_grid_base[:2])))
@@ -290,7 +291,7 @@ class Navigator:
             return self._fail(moment, Reason.BLOCKED, "no progress after every recovery")
         rung = self._ladder.climb(moment.T_odom_base, moment.now_s)
         self._progress.grace(moment.now_s)
-        self._planned_s = -np.inf
+        self._outlook = None
         if rung == Rung.CLEAR:
             self.surroundings.forget_live()
         if rung == Rung.BLOCK and self._way.close_next(moment):
@@ -315,16 +316,16 @@ class Navigator:
 
     def _room_behind(self, moment: Moment) -> bool:
         """Tell whether the costmap leaves room 10 cm behind the robot."""
-        if self.costs is None:
+        if self._outlook is None:
             return True
+        costs = self._outlook.reach.costs if self._plan is None else self._plan.costs
         back = se2.transform(moment.T_grid_base, [-0.10, 0.0])
-        if not self.costs.holds(back):
+        if not costs.holds(back):
             return False
-        row, col = self.costs.cell(back)
-        here_row, here_col = self.costs.cell(moment.T_grid_base)
-        clear = self.costs.clearance
-        there, here = clear[int(row), int(col)], clear[int(here_row), int(here_col)]
-        return bool(there * self.costs.resolution_m >= self.config.body.radius_m or there > here)
+        row, col = costs.cell(back)
+        here_row, here_col = costs.cell(moment.T_grid_base)
+        there, here = costs.clearance[int(row), int(col)], costs.clearance[int(here_row), int(here_col)]
+        return bool(there * costs.resolution_m >= self.config.body.radius_m or there > here)
 
     def _wait_for_pose(self, moment: Moment) -> NavOutput:
         if self._lost_s is None:
@@ -343,7 +344,7 @@ class Navigator:
 
     def _finish(self, state: NavState, reason: Reason, text: str) -> None:
         self._end = (state, reason, text)
-        self._goal = self._way.route = self._plan = self._target = None
+        self._goal = self._way.route = self._plan = self._outlook = None
 
     def _rest(self, moment: Moment) -> NavOutput:
         slower = approach(moment.twist, REST, self.config.body, self.config.period_s)

@@ -89,8 +89,19 @@ class Surroundings:
         ]
         self._hazards.append(hazard)
 
-    def costs(self, map_view: MapView, T_grid_base: Pose, now_s: float, *, tight: bool = False) -> Costs:
-        """Return the costmap of this moment; `tight` without the body's margin."""
+    def costs(
+        self,
+        map_view: MapView,
+        T_grid_base: Pose,
+        now_s: float,
+        *,
+        tight: bool = False,
+        half_m: float | None = None,
+    ) -> Costs:
+        """Return the costmap of this moment; `tight` without the body's margin.
+
+        half_m: only so far around the robot; None: the whole window.
+        """
         memory_s = self._config.costmap.contact_memory_s
         self._hazards = [hazard for hazard in self._hazards if now_s - hazard.stamp_s < memory_s]
         placed = [
@@ -99,7 +110,7 @@ class Surroundings:
             if hazard.node_id in map_view.T_grid_node
         ]
         hazards_grid: Points = np.array(placed).reshape(-1, 2)
-        return self._costmap.build(now_s, hazards_grid, T_grid_base[:2], tight=tight)
+        return self._costmap.build(now_s, hazards_grid, T_grid_base[:2], tight=tight, half_m=half_m)
 
     def points(self, T_odom_base: Pose, now_s: float) -> Points:
         """Return the raw range points near the body, present base frame, float64 (N, 2)."""

@@ -1,6 +1,6 @@
 """What navigation takes in and gives out, beside the types all of LEMTOMap shares."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -147,14 +147,14 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class CostmapView:
-    """Immutable picture of the costmap, in the grid frame, for viewers."""
+    """Picture of one moment's costmap, in the grid frame, for viewers: navigation does not wait for paint."""
 
     stamp_s: float
-    cost: NDArray[np.uint8]
-    """uint8 (rows, cols): 0 free .. 252 close to something, 253 too close for the body, 254 obstacle,
-    255 unknown."""
     resolution_m: float
     origin_m: tuple[float, float]
+    paint: Callable[[], NDArray[np.uint8]]
+    """uint8 (rows, cols): 0 free .. 252 close to something, 253 too close for the body, 254 obstacle,
+    255 unknown."""
 
 
 @dataclass(frozen=True, slots=True)

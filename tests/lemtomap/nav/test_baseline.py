@@ -4,7 +4,7 @@ import numpy as np
 
 from lemtomap import se2
 from lemtomap.nav.amcl.localiser import Amcl
-from lemtomap.nav.amcl.whole_grid import GOAL_ID, WholeGridPlanner
+from lemtomap.nav.amcl.whole_grid import GRID_ID, GridGraph, WholeGridLook, view_of
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal, NavState
@@ -16,18 +16,16 @@ def test_amcl_follows_a_drifting_robot_to_the_goal():
     grid = world.view().grid
     rng = np.random.default_rng(5)
     start = se2.compose(world.pose, [0.15, -0.1, 0.08])  # not quite where the robot is
-    amcl, planner = Amcl(grid, start, seed=1), WholeGridPlanner(grid, NavConfig())
-    navigator = Navigator()
-    planner.set_goal((7.0, 4.8))
-    navigator.set_goal(Goal(GOAL_ID), world.now_s)
+    amcl = Amcl(grid, start, seed=1)
+    navigator = Navigator(NavConfig(), lambda surroundings: WholeGridLook(surroundings, NavConfig()))
+    navigator.set_goal(Goal(GRID_ID, (7.0, 4.8)), world.now_s)
     T_odom_base, errors, output = world.T_odom_base, [], None
     for _ in range(500):
         sighting = world.sighting()
         T_grid_odom = amcl.update(sighting.hits_base, T_odom_base)
-        planner.renew(amcl.T_grid_base, world.now_s)
-        view = planner.view(T_grid_odom, amcl.T_grid_base, world.now_s)
+        view = view_of(grid, T_grid_odom, amcl.T_grid_base, world.now_s)
         output = navigator.step(
-            view, planner.way, T_odom_base, world.twist, sighting.hits_base, (), world.now_s
+            view, GridGraph(), T_odom_base, world.twist, sighting.hits_base, (), world.now_s
         )
         if navigator.goal is None:
             break

@@ -1,0 +1,110 @@
+"""Two looks at the surroundings: far over the window, now and then, and near around the robot, often.
+
+The far look tells how far along the route the robot can come, and the cost-to-go from everywhere to there. The
+near look works the way out anew where it matters, with what the sensors see now: over a few metres, at whose
+border the far look's cost-to-go still holds. So the window is searched once a second instead of at every turn.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from lemtomap.nav.config import NavConfig
+from lemtomap.nav.metric import MetricPlan, Reach, plan_near, plan_to, reach_from
+from lemtomap.nav.route.planner import Route
+from lemtomap.nav.sliding import Target, choose_target, find_barrier
+from lemtomap.nav.surroundings import Surroundings
+from lemtomap.nav.types import Goal
+from lemtomap.nav.way import Moment
+
+NEAR_HALF_M = 2.5
+"""Twice what a trajectory covers, so that the way round a person or a chair lies inside."""
+CLOSE_M = 2.5
+"""Nearer to a node to be passed than this, the next one is looked for at every turn."""
+DETOUR_M = 0.8
+"""When what is seen now makes the way this much longer, another one may be shorter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """What one far look found."""
+
+    stamp_s: float
+    reach: Reach
+    target: Target | None
+    """None: nothing of the route can be reached."""
+    plan: MetricPlan | None
+    tight: bool
+    """True: the target is in reach only without the body's margin."""
+
+    def index_in(self, route: Route) -> int | None:
+        """Return where in the route the target is now; None when it lies behind or on another route."""
+        if self.target is None or self.target.node_id not in route.nodes:
+            return None
+        return route.nodes.index(self.target.node_id)
+
+
+class FarLook(Protocol):
+    """Finds the way as far ahead as it knows the building."""
+
+    def look(self, goal: Goal, route: Route, moment: Moment, tolerance_m: float) -> Outlook:
+        """Return the furthest place of the route that can be reached, and the way to it."""
+        ...
+
+
+class WindowLook:
+    """Looks as far as the rolling window goes."""
+
+    def __init__(self, surroundings: Surroundings) -> None:
+        self._surroundings = surroundings
+
+    def look(self, goal: Goal, route: Route, moment: Moment, tolerance_m: float) -> Outlook:
+        """Look with the body's margin, and without it where that leads further."""
+        reach, target = self._reach(goal, route, moment, tolerance_m, tight=False)
+        beyond, tight = (0 if target is None else target.index), False
+        if target is None or find_barrier(route, moment.map_view.T_grid_node, reach, beyond) is not None:
+            narrow, further = self._reach(goal, route, moment, tolerance_m, tight=True)
+            if further is not None and (target is None or further.index > beyond):
+                reach, target, tight = narrow, further, True
+        plan = None if target is None else plan_to(reach.costs, moment.T_grid_base, target.cell)
+        return Outlook(moment.now_s, reach, target, plan, tight)
+
+    def _reach(
+        self, goal: Goal, route: Route, moment: Moment, tolerance_m: float, *, tight: bool
+    ) -> tuple[Reach, Target | None]:
+        view = moment.map_view
+        costs = self._surroundings.costs(view, moment.T_grid_base, moment.now_s, tight=tight)
+        reach = reach_from(costs, moment.T_grid_base)
+        return reach, choose_target(route, goal, view.T_grid_node, reach, tolerance_m)
+
+
+def look_near(surroundings: Surroundings, outlook: Outlook, moment: Moment) -> MetricPlan | None:
+    """Return the way to the outlook's target as the sensors show it now; None when none is left."""
+    if outlook.plan is None:
+        return None
+    costs = surroundings.costs(
+        moment.map_view, moment.T_grid_base, moment.now_s, tight=outlook.tight, half_m=NEAR_HALF_M
+    )
+    return plan_near(costs, outlook.plan, moment.T_grid_base)
+
+
+def outdated(outlook: Outlook, near: MetricPlan | None, route: Route, moment: Moment, config: NavConfig) -> bool:
+    """Tell whether it is time for another far look."""
+    age_s = moment.now_s - outlook.stamp_s
+    if age_s < config.plan_period_s - 1e-6:
+        return False
+    if age_s >= config.look_period_s - 1e-6 or near is None or outlook.plan is None:
+        return True
+    target = outlook.target
+    if target is None or outlook.index_in(route) is None:
+        return True
+    if not target.final and near.length_m < CLOSE_M:
+        return True
+    row, col = outlook.plan.costs.cell(moment.T_grid_base)
+    field, here = outlook.plan.field, (int(np.floor(row)), int(np.floor(col)))
+    if not (0 <= here[0] < field.shape[0] and 0 <= here[1] < field.shape[1]):
+        return True
+    near_row, near_col = near.costs.cell(moment.T_grid_base)
+    grown = near.field[int(near_row), int(near_col)] - field[here]
+    return bool(grown * near.costs.resolution_m > DETOUR_M)
