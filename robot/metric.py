@@ -1,6 +1,7 @@
 """The metric baseline as a robot: AMCL on a saved grid and the navigator that plans over all of it (thesis, T5)."""
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from robot.base import BaseStep
 from robot.config import RobotConfig
 from robot.core import RobotCore
 from robot.exchange import Exchange, TimedScan
+from robot.mapping import MappingStep
 from robot.navigating import NavigationStep
 
 
@@ -42,4 +44,5 @@ def build_metric_core(
     navigator = Navigator(config.nav, lambda surroundings: WholeGridLook(surroundings, config.nav))
     localising = AmclStep(grid, np.asarray(T_grid_base, dtype=np.float64), exchange, seed)
     navigation = NavigationStep(navigator, exchange, GridGraph)
-    return RobotCore(exchange, BaseStep(config, exchange), localising, navigation)
+    mapping = cast("MappingStep", localising)  # as far as the core is concerned
+    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)

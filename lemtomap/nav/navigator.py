@@ -188,7 +188,11 @@ class Navigator:
         self._planned_s = moment.now_s
         self._way.barriers.remember(self.surroundings.hits_grid(moment.map_view.T_grid_odom), moment.now_s)
         near = None if outlook is None else look_near(self.surroundings, outlook, moment)
-        if outlook is None or self._way.barriers.watching or outdated(outlook, near, route, moment, self.config):
+        if (
+            outlook is None
+            or self._way.barriers.watching
+            or outdated(outlook, near, route, moment, self.config)
+        ):
             outlook = self._outlook = self._far.look(goal, route, moment, self._tolerance_m())
             self._costmap_view = outlook.reach.costs.view()
             near = look_near(self.surroundings, outlook, moment)

@@ -89,7 +89,9 @@ def look_near(surroundings: Surroundings, outlook: Outlook, moment: Moment) -> M
     return plan_near(costs, outlook.plan, moment.T_grid_base)
 
 
-def outdated(outlook: Outlook, near: MetricPlan | None, route: Route, moment: Moment, config: NavConfig) -> bool:
+def outdated(
+    outlook: Outlook, near: MetricPlan | None, route: Route, moment: Moment, config: NavConfig
+) -> bool:
     """Tell whether it is time for another far look."""
     age_s = moment.now_s - outlook.stamp_s
     if age_s < config.plan_period_s - 1e-6:

@@ -82,13 +82,14 @@ class WholeGridLook:
         self._looked_s, self._goal = moment.now_s, goal
         reach = self._reach_at(moment, anew=barred)
         found = reach.nearest(goal.p_node, tolerance_m)
-        plan: MetricPlan | None = None
-        if found is not None:
-            plan = plan_to(reach.costs, moment.T_grid_base, found[:2])
+        plan = None if found is None else self._search(reach, moment.T_grid_base, found[:2])
         if found is None or plan is None:
             raise NoRoute(f"no way over the grid to {goal.p_node[0]:.1f}, {goal.p_node[1]:.1f}")
         target = Target(0, GRID_ID, found[:2], final=True, proven=found[2] == 1)
         return Outlook(moment.now_s, reach, target, plan, tight=False)
+
+    def _search(self, reach: Reach, T_grid_base: Pose, cell: tuple[int, int]) -> MetricPlan | None:
+        return plan_to(reach.costs, T_grid_base, cell)
 
     def _reach_at(self, moment: Moment, *, anew: bool) -> Reach:
         """Return what can be reached, searched again only where the old costs do not serve."""
