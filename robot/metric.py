@@ -1,4 +1,4 @@
-"""The metric baseline as a robot: AMCL on a saved grid and the navigator that plans over all of it (thesis, T5)."""
+"""The metric baseline as a robot: AMCL on a saved grid, and the navigator that plans over all of it (T5)."""
 
 from collections.abc import Sequence
 from typing import cast

@@ -4,6 +4,8 @@
     lemtomap bench nav dwa            one control cycle's parts
     lemtomap bench nav tasks --world office --metres 15 --seeds 5 --out runs/nav
                                       topological against metric navigation, there and back twice
+    lemtomap bench nav goals --world offices:24:3 --count 40 [--people 6] [--depth]
+                                      random goals after one led round; --world may be given several times
 
 CPU is thread time. Everything that drives runs in lock-step with the simulator.
 """
@@ -11,6 +13,7 @@ CPU is thread time. Everything that drives runs in lock-step with the simulator.
 import argparse
 from pathlib import Path
 
+from tools.nav_goals import bench_goals
 from tools.nav_planner import bench_dwa, bench_planner
 from tools.nav_tasks import bench_tasks
 
@@ -19,18 +22,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="lemtomap bench nav", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=["planner", "dwa", "tasks"])
-    parser.add_argument("--world", default="office")
+    parser.add_argument("what", choices=["planner", "dwa", "tasks", "goals"])
+    parser.add_argument("--world", action="append", default=[])
     parser.add_argument("--metres", type=float, default=40.0)
-    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--count", type=int, default=40, help="goals for each world and seed")
+    parser.add_argument("--people", type=int, default=0)
+    parser.add_argument("--depth", action="store_true", help="with the simulated depth camera")
     parser.add_argument("--out", type=Path, default=Path("runs/nav"))
     args = parser.parse_args()
+    worlds, seeds = args.world or ["office"], range(args.seeds)
     if args.what == "planner":
         bench_planner()
     elif args.what == "dwa":
         bench_dwa()
+    elif args.what == "goals":
+        bench_goals(worlds, seeds, args.count, args.out, people=args.people, depth=args.depth)
     else:
-        bench_tasks(args.world, args.metres, range(args.seeds), args.out)
+        for world in worlds:
+            bench_tasks(world, args.metres, seeds, args.out)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Buildings for navigation benches: the robot is led through one once, as a person would with a joystick.
 
-A led drive follows a path planned on the true plan; the robot maps on the way. The truth is used to lead and to
-judge, never by the robot.
+A led drive follows a path planned on the true plan; the robot maps on the way. The truth is used to lead
+and to judge, never by the robot.
 """
 
 import time

@@ -1,8 +1,8 @@
 """The thesis' navigation tasks (5-2-2): there and back twice, topological against metric, side by side.
 
 The robot is led there and back once; then it drives the way by itself over its own topological map. The
-baseline drives between the same places with AMCL and a field over the true plan of the whole building, starting
-where and as the topological robot did. Costmap, near look, DWA, limits and recoveries are one and the same code.
+baseline drives between the same places with AMCL and a field over the true plan of the whole building,
+starting where and as the topological robot did. Costmap, near look, DWA, limits and recoveries are the same.
 """
 
 import json
@@ -157,7 +157,7 @@ def _metric(world: World, start: Any, ends: Sequence[tuple[float, float]], leg: 
 def drive_metric(
     core: RobotCore, simulator: Simulator, leg: Leg, ends: Sequence[tuple[float, float]]
 ) -> Legs:
-    """Drive to points of the grid one after another. The first plan is the search alone, without its costmap."""
+    """Drive to points of the grid one after another; the first plan is the search without its costmap."""
     meters = Meter(), Meter()
     navigator = core.navigation.navigator
     look = navigator._far  # noqa: SLF001 - measured from outside on purpose

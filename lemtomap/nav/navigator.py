@@ -1,6 +1,6 @@
 """The navigator: first topological, then metric, then a velocity (thesis, 3-5; one object instead of three).
 
-    goal -> route over nodes -> sliding metric goal -> field in the window -> field near by -> DWA -> raw points
+    goal -> route over nodes -> sliding metric goal -> field in the window, field near by -> DWA -> raw points
 
 `step` is called at control rate and never waits; each call says what it does and, when it cannot, why.
 """

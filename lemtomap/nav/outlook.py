@@ -1,8 +1,8 @@
 """Two looks at the surroundings: far over the window, now and then, and near around the robot, often.
 
-The far look tells how far along the route the robot can come, and the cost-to-go from everywhere to there. The
-near look works the way out anew where it matters, with what the sensors see now: over a few metres, at whose
-border the far look's cost-to-go still holds. So the window is searched once a second instead of at every turn.
+The far look tells how far along the route the robot can come, and the cost-to-go from everywhere to there.
+The near look works the way out anew where it matters, with what the sensors see now: over a few metres, at
+whose border the far look's cost-to-go still holds. So the window is searched once a second, not at each turn.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """The metric baseline's far look: a field over the whole saved grid, renewed every second (thesis, 2-4-1).
 
-Everything nearer than that, the near look, the Dynamic Window Approach and the recoveries, is the same navigator.
-The map is one grid, so its frame is the only node, and a goal is a point in it.
+Everything nearer than that, the near look, the Dynamic Window Approach and the recoveries, is the same
+navigator. The map is one grid, so its frame is the only node, and a goal is a point in it.
 """
 
 from collections.abc import Sequence
