@@ -232,7 +232,7 @@ class Navigator:
                 return self._output(moment, REST, *self._end)
         else:
             step = self._follower.step(plan, moment.T_grid_base, moment.twist, end_m)
-        remaining_m = plan.length_m + sum(edge.length_m for edge in self._beyond(route))
+        remaining_m = plan.length_m - target.beyond_m + sum(edge.length_m for edge in self._beyond(route))
         if self._progress.stuck(remaining_m, moment.now_s):
             return self._climb(moment)
         self._ladder.relax(self._progress.take_gain())
@@ -246,7 +246,7 @@ class Navigator:
             Reason.OBSTACLE if step.motion == Motion.STUCK or twist.v_mps < step.twist.v_mps else Reason.NONE
         )
         rest = self._beyond(route)
-        remaining_m = plan.length_m + sum(edge.length_m for edge in rest)
+        remaining_m = plan.length_m - target.beyond_m + sum(edge.length_m for edge in rest)
         speed_mps = self.config.route.usual_speed_mps
         expected_s = plan.length_m / speed_mps + sum(edge.time_s for edge in rest)
         return replace(

@@ -1,4 +1,4 @@
-"""The sliding goal: the furthest node of the route that lies in the window and is proved reachable in it.
+"""The sliding goal: the furthest place of the route that lies in the window and is proved reachable in it.
 
 The goal slides along the route while the robot drives; nothing is cancelled and started again, so there is no
 stammer between nodes (thesis, 5-2-2 and Figure 5-13).
@@ -6,7 +6,7 @@ stammer between nodes (thesis, 5-2-2 and Figure 5-13).
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lemtomap import se2
 from lemtomap.nav import kernels
@@ -21,6 +21,10 @@ BORDER_M = 0.4
 DETOUR_SHARE = 1.3
 DETOUR_M = 1.5
 """A way this much longer than the edges it follows leads round something."""
+STEP_M = 0.25
+"""Places on an edge are tried this far apart."""
+WORTH_M = 1.0
+"""This much seen way along the next edge is better than a node over unseen floor."""
 SNAP_M = 0.30
 """A node's pose in the window may be off by this much; its place is looked for this near."""
 
@@ -37,6 +41,8 @@ class Target:
     """True: this is the goal itself."""
     proven: bool
     """True: over seen floor all the way."""
+    beyond_m: float = 0.0
+    """How far along the edge behind that node the place lies: nobody slows down at a node to be passed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +82,30 @@ def choose_target(
         target = _target_at(index, route, goal, T_grid_node, reach, goal_tolerance_m)
         if target is None:
             continue
-        if target.proven and (index > 0 or last == 0 or unproven is None):
-            return target
-        if not target.proven and index > 0:
-            unproven = target
-        if not target.proven and last == 0:
-            return target
+        if not target.proven:
+            if index > 0 or last == 0:
+                unproven = target
+            continue
+        further = target if target.final else _along_edge(target, route, T_grid_node, reach)
+        if index > 0 or unproven is None or further.beyond_m > WORTH_M:
+            return further
     return unproven
+
+
+def _along_edge(target: Target, route: Route, T_grid_node: Mapping[int, Pose], reach: Reach) -> Target:
+    """Return the furthest place over seen floor on the edge behind a node; the node if there is none."""
+    if target.index + 1 >= len(route.nodes):
+        return target
+    near, far = (T_grid_node.get(route.nodes[target.index + step]) for step in (0, 1))
+    if near is None or far is None:
+        return target
+    length_m = math.dist(near[:2], far[:2])
+    for step in range(int(length_m / STEP_M), 0, -1):
+        place = near[:2] + (far[:2] - near[:2]) * (step * STEP_M / length_m)
+        found = reach.nearest(place, SNAP_M) if reach.costs.holds(place, BORDER_M) else None
+        if found is not None and found[2] == 1:
+            return replace(target, cell=found[:2], beyond_m=step * STEP_M)
+    return target
 
 
 def find_barrier(route: Route, T_grid_node: Mapping[int, Pose], reach: Reach, beyond: int) -> Barrier | None:
