@@ -70,15 +70,15 @@ class _Moment:
     truth: NDArray[np.float64]
 
 
-def record_tour(simulator: Simulator, tour: Tour, path: Path) -> int:
-    """Drive a tour and write its log; return the number of scans."""
+def record_tour(simulator: Simulator, tour: Tour, path: Path, limit_s: float | None = None) -> int:
+    """Drive a tour, at most so long, and write its log; return the number of scans."""
     simulator.hokuyo.write(b"BM\n")
     odometry = DeadReckoning()
     history: deque[_Moment] = deque(maxlen=16)
     scans, written_s = 0, -1.0
     with path.open("w", encoding="ascii") as log:
         log.write("# simulated TurtleBot 2, URG-04LX-UG01 cut to 180 degrees, truth in TRUEPOS\n")
-        for _ in drive(simulator, tour):
+        for _ in drive(simulator, tour, limit_s):
             simulator.kobuki.read()
             simulator.hokuyo.read()
             sent = simulator.base.last

@@ -28,6 +28,7 @@ class TourConfig:
     """Constant, as in the thesis; the TurtleBot's usual pace."""
     turn_radps: float = 1.0
     look_ahead_m: float = 0.40
+    spacing_m: float = SPACING_M
 
 
 class Tour:
@@ -84,7 +85,7 @@ def plan_tour(world: World, duration_s: float, config: TourConfig | None = None,
     config = config or TourConfig()
     planner = RoutePlanner(world.raster)
     here = (world.spawn[0], world.spawn[1])
-    places = planner.places(here, SPACING_M)
+    places = planner.places(here, config.spacing_m)
     rng = np.random.default_rng(seed)
     left, legs, length_m = list(places), [], 0.0
     while length_m < duration_s * config.speed_mps * 0.93:  # turning on the spot takes the rest

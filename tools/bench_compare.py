@@ -1,46 +1,166 @@
-"""What got better or worse between two reports of a bench: lemtomap bench compare OLD.json NEW.json."""
+"""What got better or worse: two reports, or two versions of the program measured in turns.
 
+    lemtomap bench compare OLD.json NEW.json              reports of any bench
+    lemtomap bench compare --against REVISION LOG [--pairs 7] [--slam window]
+
+The second form checks a revision out beside this one and maps the same log with both in turns (old, new,
+new, old ...): what a busy machine does to one it does to the other, so the ratio of a pair is far steadier
+than either time. Ratios are new over old; a change counts when its 95 % range leaves out 1.
+"""
+
+import argparse
 import json
+import shutil
+import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-NOISE = 0.05  # ratios this near to 1 say nothing on a shared machine
+import numpy as np
+from scipy import stats
+
+from tools.mapping_runs import slam_cpu_s, table
+
+NOISE = 0.05  # without repetitions, ratios this near to 1 say nothing on a shared machine
+MEASURES: Mapping[str, Callable[[dict[str, Any]], float]] = {
+    "CPU of the metric layer, s": lambda told: float(told["cpu_by_part_s"]["grid"]),
+    "CPU of the topological layer, s": lambda told: float(told["cpu_by_part_s"]["topo"]),
+    "CPU of mapping, s": slam_cpu_s,
+    "peak memory, MB": lambda told: float(told["peak_rss_mb"]),
+    "map on disk, kB": lambda told: float(told["map_bytes"]) / 1000.0,
+}
 
 
-def numbers(report: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, float]]:
-    """Yield every number of a report with its path."""
+def numbers(report: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, list[float]]]:
+    """Yield every number of a report with its path; a list of numbers is one quantity, repeated."""
     for key, value in report.items():
         if isinstance(value, Mapping):
             yield from numbers(value, f"{prefix}{key} ")
         elif isinstance(value, int | float) and not isinstance(value, bool):
-            yield f"{prefix}{key}", float(value)
+            yield f"{prefix}{key}", [float(value)]
+        elif isinstance(value, list) and value and all(isinstance(each, int | float) for each in value):
+            yield f"{prefix}{key}", [float(each) for each in value]
+
+
+def ratio(old: Sequence[float], new: Sequence[float]) -> tuple[float, float, float]:
+    """Return new over old and its 95 % range: paired where both have as many values, NaN range for one."""
+    a, b = np.array(old), np.array(new)
+    if len(a) != len(b) or len(a) < 2:
+        return float(b.mean() / a.mean()), float("nan"), float("nan")
+    logs = np.log(b / a)
+    half = float(stats.t.ppf(0.975, len(logs) - 1) * logs.std(ddof=1) / np.sqrt(len(logs)))
+    middle = float(logs.mean())
+    return float(np.exp(middle)), float(np.exp(middle - half)), float(np.exp(middle + half))
+
+
+def changed(old: Sequence[float], new: Sequence[float]) -> bool:
+    """Tell whether two values or two series differ by more than noise."""
+    middle, low, high = ratio(old, new)
+    return abs(middle - 1.0) > NOISE if np.isnan(low) else not low <= 1.0 <= high
 
 
 def compare(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    """Return a line for each number that changed by more than the noise: old, new, ratio."""
-    before = dict(numbers(old))
-    lines = []
-    for name, value in numbers(new):
-        if name not in before or before[name] == 0.0 or value != value:  # noqa: PLR0124 - not a number
+    """Return a table of what changed between two reports."""
+    before, rows = dict(numbers(old)), []
+    for name, values in numbers(new):
+        was = before.get(name)
+        if was is None or min(was) <= 0.0 or min(values, default=0.0) <= 0.0 or not changed(was, values):
             continue
-        ratio = value / before[name]
-        if abs(ratio - 1.0) > NOISE:
-            lines.append(f"{name:<60} {before[name]:>12.4g} -> {value:<12.4g} x{ratio:.2f}")
-    return "\n".join(lines) or f"nothing changed by more than {NOISE:.0%}"
+        middle, low, high = ratio(was, values)
+        spread = "" if np.isnan(low) else f"{low:.2f} to {high:.2f}"
+        rows.append([name, f"{np.mean(was):.4g}", f"{np.mean(values):.4g}", f"x{middle:.2f}", spread])
+    return (
+        table(["figure", "old", "new", "ratio", "95 % range"], rows)
+        if rows
+        else "nothing changed beyond noise"
+    )
+
+
+def compare_files(old: Path, new: Path) -> str:
+    """Return what changed between two report files."""
+    return compare(json.loads(old.read_text()), json.loads(new.read_text()))
+
+
+def paired(revision: str, log: Path, pairs: int, slam: str) -> str:
+    """Map a log with an old revision and with this one in turns; return the table of ratios."""
+    here = Path(__file__).resolve().parents[1]
+    with tempfile.TemporaryDirectory() as folder:
+        there = Path(folder) / "old"
+        _git(here, "worktree", "add", "--detach", str(there), revision)
+        try:
+            found: dict[Path, list[dict[str, Any]]] = {here: [], there: []}
+            for pair in range(-1, pairs):  # the first one compiles
+                for root in (there, here) if pair % 2 else (here, there):
+                    told = _map(root, log, Path(folder) / "out", slam)
+                    if pair >= 0:
+                        found[root].append(told)
+                print(f"pair {max(pair, 0) + (pair >= 0)} of {pairs}", file=sys.stderr, flush=True)
+        finally:
+            _git(here, "worktree", "remove", "--force", str(there))
+    rows = []
+    for name, of in MEASURES.items():
+        old, new = ([float(of(told)) for told in found[root]] for root in (there, here))
+        middle, low, high = ratio(old, new)
+        verdict = ("worse" if middle > 1.0 else "better") if changed(old, new) else "no change shown"
+        row = [
+            name,
+            f"{np.mean(old):.4g}",
+            f"{np.mean(new):.4g}",
+            f"x{middle:.3f}",
+            f"{low:.3f} to {high:.3f}",
+        ]
+        rows.append([*row, verdict])
+    return table(["figure", "old", "new", "ratio", "95 % range", ""], rows)
+
+
+def _map(root: Path, log: Path, out: Path, slam: str) -> dict[str, Any]:
+    shutil.rmtree(out, ignore_errors=True)
+    command = [sys.executable, "-m", "robot", "map", str(log.resolve()), "--out", str(out), "--slam", slam]
+    subprocess.run(command, check=True, cwd=root, stdout=subprocess.DEVNULL)  # noqa: S603 - our own program
+    told: dict[str, Any] = json.loads((out / "summary.json").read_text())
+    return told
+
+
+def _git(root: Path, *arguments: str) -> None:
+    git = shutil.which("git") or "git"
+    done = subprocess.run(  # noqa: S603 - git itself
+        [git, "-C", str(root), *arguments], check=False, capture_output=True, text=True
+    )
+    if done.returncode:
+        raise SystemExit(f"git {arguments[0]}: {done.stderr.strip().splitlines()[-1]}")
 
 
 def main(arguments: list[str]) -> int:
-    if len(arguments) != 2:
-        print(__doc__, file=sys.stderr)
+    parser = argparse.ArgumentParser(
+        prog="lemtomap bench compare",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="OLD.json NEW.json, or a LOG")
+    parser.add_argument(
+        "--against", metavar="REVISION", help="measure this git revision and the present files"
+    )
+    parser.add_argument("--pairs", type=int, default=7)
+    parser.add_argument("--slam", default="window")
+    options: Any = parser.parse_args(arguments)
+    wanted = 1 if options.against else 2
+    if len(options.files) != wanted:
+        print(f"expected {'one LOG' if wanted == 1 else 'OLD.json NEW.json'}", file=sys.stderr)
+        return 2
+    missing = [path for path in options.files if not path.exists()]
+    if missing:
+        print(f"{missing[0]}: no such file", file=sys.stderr)
         return 2
     try:
-        old, new = (json.loads(Path(name).read_text()) for name in arguments)
-    except (OSError, ValueError) as error:
-        print(error, file=sys.stderr)
+        if options.against:
+            print(paired(options.against, options.files[0], options.pairs, options.slam))
+        else:
+            print(compare_files(*options.files))
+    except ValueError as error:
+        print(f"not a report: {error}", file=sys.stderr)
         return 2
-    print(compare(old, new))
     return 0
 
 
