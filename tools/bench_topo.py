@@ -151,7 +151,7 @@ def scale(args: argparse.Namespace) -> None:
                 driver.drive(2000)
             reopen_s = np.nan
         else:
-            driver, reopen_s = _grown(driver, path, target, config, rng)
+            driver, reopen_s = grown(driver, path, target, config, rng)
         ms = 1e3 * driver.drive(TIMED)
         driver.mapper.store.commit()
         nodes = driver.mapper.store.count("node")
@@ -160,7 +160,7 @@ def scale(args: argparse.Namespace) -> None:
     driver.mapper.close()
 
 
-def _grown(
+def grown(
     driver: Driver, path: Path, target: int, config: TopoConfig, rng: np.random.Generator
 ) -> tuple[Driver, float]:
     """Close, let the map grow on disk, reopen and go on; return how long that took, s."""

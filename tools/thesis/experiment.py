@@ -54,7 +54,7 @@ class Experiment:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.drives = [Drive("small", plan.small, SMALL_S), Drive("large", plan.large, plan.large_s)]
-        self.tasks = [Task(name, plan.small if name == "small" else plan.large, 0) for name in plan.tasks]
+        self.tasks = [Task(name, plan.small if name == "small" else plan.large) for name in plan.tasks]
         self._systems: Sequence[System] = SYSTEMS
 
     def run(self, *, fresh: bool = False) -> None:
@@ -105,7 +105,7 @@ class Experiment:
 
     def _navigation(self, task: Task) -> Piece:
         key = Drive(task.name, task.world, task.metres).key
-        return Piece(f"navigation-{key}-{task.seed}", lambda: task.run(self.plan.out / f"navigation-{key}"))
+        return Piece(f"navigation-{key}", lambda: task.run(self.plan.out / f"navigation-{key}"))
 
     # -- the report -----------------------------------------------------------------------------------------
 
