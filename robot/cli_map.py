@@ -33,7 +33,10 @@ def register(app: typer.Typer) -> None:
         "lemtomap bench                                     what can be measured\n"
         "lemtomap bench thesis --quick                      chapter 5 of the thesis, as a report\n"
         "lemtomap bench logs intel.clf.xz aces.clf.xz       every metric layer on recorded logs\n"
-        "lemtomap bench topo scale                          a map of a million nodes\n\n"
+        "lemtomap bench scale                               the map of a drive of 1,000 km\n"
+        "lemtomap bench soak --hours 4                      hours of driving: memory, CPU, closures, goals\n"
+        "lemtomap bench --compare OLD.json NEW.json         what changed between two reports\n"
+        "lemtomap bench --compare OLD.json                  the version that wrote it and this one, in turns\n\n"
         "Measure; everything after the name goes to that bench (--help too).",
         short_help="Measure.",
         context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []},
@@ -85,4 +88,4 @@ def bench(
         typer.echo(context.get_help() + "\n")
         typer.echo("\n".join(f"  {known:<10} {about}" for known, about in sorted(benches().items())))
         return
-    raise typer.Exit(run_bench(name, context.args))
+    raise typer.Exit(run_bench(name.removeprefix("--"), context.args))

@@ -1,11 +1,13 @@
 """One system on one drive: its subsystems in a chain of processes, fed with the recorded scans."""
 
 import json
+import math
 import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +41,7 @@ SYSTEMS = (OURS, OURS_5, BASELINE)
 """Section 5-2-1: 5 particles in the window against 80 on the growing grid; ours also as it is by default."""
 
 
-def map_drive(log: Path, system: System, seed: int, out: Path) -> dict[str, Any]:
+def map_drive(log: Path, system: System, seed: int, out: Path, until_s: float = math.inf) -> dict[str, Any]:
     """Let a system map a recorded drive; return each subsystem's readings and the map's figures."""
     out.mkdir(parents=True, exist_ok=True)
     for old in out.glob("*.json"):
@@ -59,7 +61,7 @@ def map_drive(log: Path, system: System, seed: int, out: Path) -> dict[str, Any]
             if chain and chain[-1].stdout is not None:
                 chain[-1].stdout.close()  # the next process has it now
             chain.append(process)
-        _feed(log, chain[0])
+        _feed(log, chain[0], until_s)
         codes = [process.wait() for process in chain]
     finally:
         for process in chain:
@@ -71,27 +73,26 @@ def map_drive(log: Path, system: System, seed: int, out: Path) -> dict[str, Any]
     return {name: json.loads((out / f"{name}.json").read_text()) for name in system.parts}
 
 
-def _feed(log: Path, first: subprocess.Popen[bytes]) -> None:
+def _feed(log: Path, first: subprocess.Popen[bytes], until_s: float) -> None:
     pipe = first.stdin
     if pipe is None:
         raise ValueError("the first process of a chain needs a pipe")
     try:
-        for message in _messages(log):
+        for message in _messages(log, until_s):
             send(pipe, message)
         pipe.close()
     except BrokenPipeError:
         pass  # its exit code tells more
 
 
-def _messages(log: Path) -> Iterator[Frame | Begin | End]:
+def _messages(log: Path, until_s: float) -> Iterator[Frame | Begin | End]:
     """Yield the warm-up, then the drive."""
     scans = open_log(log)
-    for frame in _frames(scans):
-        if frame.drive_s > WARM_S:
-            break
-        yield frame
+    yield from takewhile(lambda frame: frame.drive_s < WARM_S, _frames(scans))
+    yield Begin(measured=False)  # the robot starts anywhere in a known map: look-up and proof are loaded too
+    yield from takewhile(lambda frame: frame.drive_s < WARM_S, _frames(scans))
     yield Begin()
-    yield from _frames(scans)
+    yield from takewhile(lambda frame: frame.drive_s < until_s, _frames(scans))
     yield End()
 
 

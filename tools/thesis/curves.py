@@ -41,7 +41,7 @@ def draw_parts(
 ) -> None:
     """Draw each subsystem for itself, ours left and the baseline right (figures 5-4, 5-5, 5-7, 5-8)."""
     figure = Figure(figsize=(9, 7.5), dpi=100, layout="constrained")
-    grid = figure.subplots(3, 2, sharey="row" if same_scale else False)
+    grid = figure.subplots(3, 2)
     for column, (name, readings) in enumerate((ours, theirs)):
         for row, (title, of) in enumerate(ROWS):
             axes = grid[row, column]
@@ -49,6 +49,10 @@ def draw_parts(
                 axes.plot(curve.drive_s / 60.0, of(curve), color=PART_COLOURS[part], label=part)
             _finish(axes, f"{name}: {title}")
         grid[0, column].legend(fontsize=8)
+    for left, right in grid if same_scale else ():
+        top = max(left.get_ylim()[1], right.get_ylim()[1])
+        left.set_ylim(top=top)
+        right.set_ylim(top=top)
     figure.savefig(path)
 
 

@@ -13,7 +13,7 @@ from sim.simulator import Simulator
 from sim.tours import TourConfig, plan_tour
 from tools.tour_error import error_m, truth_and_odometry
 
-SPACING_M = 8.0  # of the places a drive visits: it crosses the building as the thesis' did, not room by room
+SPACING_M = 15.0  # of the places a drive visits: it crosses the building as the thesis' did, not room by room
 
 WRONG_M, WRONG_RAD = 0.5, 0.2  # a closure this far from the truth is another place
 

@@ -65,6 +65,7 @@ class Experiment:
             shutil.rmtree(self.plan.out)
         self.pieces = Pieces(self.plan.out / "pieces")
         self.pieces.run([self._recording(drive) for drive in self.drives], self.plan.jobs)
+        self.pieces.run([self._compiling(system) for system in self._systems], 1)
         self.pieces.run(self._runs(), self.plan.jobs)
 
     def _recording(self, drive: Drive) -> Piece:
@@ -72,6 +73,14 @@ class Experiment:
             return {"log": drive.log(self.plan.out).name}
 
         return Piece(f"recording-{drive.key}", work)
+
+    def _compiling(self, system: System) -> Piece:
+        """Return a short run that fills the kernels' cache: a process that compiles keeps more memory."""
+
+        def work() -> dict[str, Any]:
+            return map_drive(self.drives[0].log(self.plan.out), system, 0, self.plan.out / "compiling", 1.0)
+
+        return Piece(f"compiling-{system.key}", work)
 
     def _runs(self) -> list[Piece]:
         """Return the longest first; the repetitions of the systems take turns, so that they meet the same

@@ -32,7 +32,10 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Begin:
-    """What came before was to compile and to load; from here on everything is new and measured."""
+    """What came before was to compile and to load; from here on everything is new."""
+
+    measured: bool = True
+    """False: load more, by meeting the map made so far as one of an earlier day."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,8 +56,9 @@ def run(name: str, options: PartOptions, source: IO[bytes], sink: IO[bytes]) -> 
         if isinstance(message, Begin):
             part.drop()
             part = PARTS[name](options)
-            meter = Meter()  # the first one is gone, the next has not begun: this is the process alone
-            part.begin()
+            if message.measured:  # the last one is gone, the next has not begun: this is the process alone
+                meter = Meter()
+            part.begin(known=not message.measured)
         elif isinstance(message, Frame):
             if meter is None:
                 part.take(message)

@@ -39,8 +39,8 @@ class Part(ABC):
         self.options = options
 
     @abstractmethod
-    def begin(self) -> None:
-        """Start; memory from here on is the subsystem's own."""
+    def begin(self, *, known: bool = False) -> None:
+        """Start; memory from here on is the subsystem's own. `known`: keep the map file that is there."""
 
     @abstractmethod
     def take(self, frame: Frame) -> None:
@@ -57,7 +57,7 @@ class Part(ABC):
 class MetricMapping(Part):
     """The rolling window, or the baseline's growing grid."""
 
-    def begin(self) -> None:
+    def begin(self, *, known: bool = False) -> None:  # noqa: ARG002 - only the map file lasts
         """Start with an empty map."""
         self._slam = SLAMS[self.options.slam](SlamConfig(particles=self.options.particles), self.options.seed)
         self._poses: list[se2.Pose] = []
@@ -89,7 +89,7 @@ class TopologicalMapping(Part):
         """Close the file."""
         self._mapper.close()
 
-    def begin(self) -> None:
+    def begin(self, *, known: bool = False) -> None:
         """Start with an empty file."""
         from lemtomap.topo.config import TopoConfig  # noqa: PLC0415 - only this process holds it
         from lemtomap.topo.loops import LoopRecogniser  # noqa: PLC0415
@@ -97,9 +97,9 @@ class TopologicalMapping(Part):
         from lemtomap.topo.store import TopoStore  # noqa: PLC0415
 
         path = self.options.out / "map.lemto"
-        for old in self.options.out.glob("map.lemto*"):
+        for old in () if known else self.options.out.glob("map.lemto*"):
             old.unlink()
-        store = TopoStore.create(path, durable=False)
+        store = TopoStore.open(path, durable=False) if known else TopoStore.create(path, durable=False)
         self._mapper = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
         self._grid: GridView | None = None
         self._node_id = 0
@@ -162,7 +162,7 @@ def _wait_for(path: Path) -> None:
 class MetricNavigation(Part):
     """The costmap around the robot at 5 Hz; the baseline's whole grid besides, whenever it is published."""
 
-    def begin(self) -> None:
+    def begin(self, *, known: bool = False) -> None:  # noqa: ARG002 - only the map file lasts
         """Start without obstacles."""
         from lemtomap.nav.config import NavConfig  # noqa: PLC0415 - only this process holds it
         from lemtomap.nav.costmap import Costmap  # noqa: PLC0415
@@ -241,7 +241,7 @@ class Window:
 class TopologicalNavigation(Part):
     """Waits for a goal: follows the map file, and once a node keeps the links around it at hand."""
 
-    def begin(self) -> None:
+    def begin(self, *, known: bool = False) -> None:  # noqa: ARG002 - only the map file lasts
         """Open the map when the first node is in it."""
         self._graph: Any = None
 
