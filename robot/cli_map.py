@@ -36,7 +36,7 @@ def register(app: typer.Typer) -> None:
         "lemtomap bench scale                               the map of a drive of 1,000 km\n"
         "lemtomap bench soak --hours 4                      hours of driving: memory, CPU, closures, goals\n"
         "lemtomap bench --compare OLD.json NEW.json         what changed between two reports\n"
-        "lemtomap bench --compare OLD.json                  the version that wrote it and this one, in turns\n\n"
+        "lemtomap bench --compare OLD.json                  its version and this one, in turns\n\n"
         "Measure; everything after the name goes to that bench (--help too).",
         short_help="Measure.",
         context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []},

@@ -1,11 +1,12 @@
 """What got better or worse: two reports, or two versions of the program measured in turns.
 
     lemtomap bench compare OLD.json NEW.json              reports of any bench
-    lemtomap bench compare --against REVISION LOG [--pairs 7] [--slam window]
+    lemtomap bench compare OLD.json [--pairs 7]           a report of `bench thesis`, made by an older version
+    lemtomap bench compare --against REVISION LOG         any git revision, on any recorded log
 
-The second form checks a revision out beside this one and maps the same log with both in turns (old, new,
-new, old ...): what a busy machine does to one it does to the other, so the ratio of a pair is far steadier
-than either time. Ratios are new over old; a change counts when its 95 % range leaves out 1.
+The last two forms check the old version out beside this one and map the same log with both in turns (old,
+new, new, old ...): what a busy machine does to one it does to the other, so the ratio of a pair is far
+steadier than either time. Ratios are new over old; a change counts when its 95 % range leaves out 1.
 """
 
 import argparse
@@ -83,6 +84,15 @@ def compare_files(old: Path, new: Path) -> str:
     return compare(json.loads(old.read_text()), json.loads(new.read_text()))
 
 
+def source_of(report: Path) -> tuple[str, Path]:
+    """Return the version that wrote a report of `bench thesis` and the log it is to be repeated on."""
+    told = json.loads(report.read_text())
+    revision, log = told.get("revision"), report.parent / str(told.get("log"))
+    if not revision or not log.exists():
+        raise ValueError(f"{report}: names no version, or its log {log.name} is gone; give NEW.json as well")
+    return revision, log
+
+
 def paired(revision: str, log: Path, pairs: int, slam: str) -> str:
     """Map a log with an old revision and with this one in turns; return the table of ratios."""
     here = Path(__file__).resolve().parents[1]
@@ -139,27 +149,27 @@ def main(arguments: list[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="OLD.json NEW.json, or a LOG")
-    parser.add_argument(
-        "--against", metavar="REVISION", help="measure this git revision and the present files"
-    )
+    parser.add_argument("--against", metavar="REVISION", help="the old version, as git names it")
     parser.add_argument("--pairs", type=int, default=7)
     parser.add_argument("--slam", default="window")
     options: Any = parser.parse_args(arguments)
-    wanted = 1 if options.against else 2
-    if len(options.files) != wanted:
-        print(f"expected {'one LOG' if wanted == 1 else 'OLD.json NEW.json'}", file=sys.stderr)
+    if len(options.files) > (1 if options.against else 2):
+        print(f"expected {'one LOG' if options.against else 'OLD.json NEW.json'}", file=sys.stderr)
         return 2
     missing = [path for path in options.files if not path.exists()]
     if missing:
         print(f"{missing[0]}: no such file", file=sys.stderr)
         return 2
     try:
-        if options.against:
-            print(paired(options.against, options.files[0], options.pairs, options.slam))
+        if len(options.files) == 1:
+            revision, log = options.against, options.files[0]
+            if revision is None:
+                revision, log = source_of(log)
+            print(paired(revision, log, options.pairs, options.slam))
         else:
             print(compare_files(*options.files))
     except ValueError as error:
-        print(f"not a report: {error}", file=sys.stderr)
+        print(error, file=sys.stderr)
         return 2
     return 0
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +47,18 @@ class Plan:
     large_s: float = 660.0  # section 5-2-1: about 11 minutes
     tasks: Sequence[str] = ("small", "large")
     jobs: int = 2
+
+
+def revision() -> str | None:
+    """Return which version of the program this is, as git names it; None without git."""
+    git = shutil.which("git")
+    if git is None:
+        return None
+    here = str(Path(__file__).parent)
+    told = subprocess.run(  # noqa: S603 - git itself
+        [git, "-C", here, "rev-parse", "HEAD"], check=False, capture_output=True, text=True
+    )
+    return told.stdout.strip() or None
 
 
 class Experiment:
@@ -194,7 +207,12 @@ class Experiment:
 
     def _numbers(self, drives: Mapping[str, Mapping[str, SystemReadings]], tasks: Any) -> dict[str, Any]:
         """Return what a later run compares itself with."""
-        found: dict[str, Any] = {"versions": versions(), "navigation": tasks}
+        found: dict[str, Any] = {
+            "versions": versions(),
+            "revision": revision(),
+            "log": self.drives[-1].log(self.plan.out).name,
+            "navigation": tasks,
+        }
         for drive in self.drives:
             found[drive.name] = {
                 system.key: {
