@@ -65,6 +65,22 @@ def final_map(mapper: TopoMapper, *, whole_drive: bool = True) -> FinalMap:
     )
 
 
+def map_on_path(mapper: TopoMapper, T_grid_base: Pose) -> FinalMap:
+    """Place everything on the path of a metric layer that keeps the whole of it and closes its own loops:
+    float64 (scans, 3), in the order of the drive.
+    """
+    records = np.concatenate(list(mapper.trail.records()))
+    ids, first = np.unique(records["node_id"], return_index=True)
+    nodes = compose(T_grid_base[first], inverse(records["T_node_base"][first]))
+    return FinalMap(
+        T_map_node=_with_the_rest(mapper.store, dict(zip(ids.tolist(), nodes, strict=True))),
+        edges=[(edge.source_id, edge.target_id, edge.type) for edge in mapper.store.edges()],
+        stamps_s=records["stamp_s"].copy(),
+        T_map_base=T_grid_base,
+        T_map_grid=np.zeros(3),
+    )
+
+
 def _with_the_rest(store: TopoStore, placed: Mapping[int, Pose]) -> dict[int, Pose]:
     """Return all nodes of the store: those no scan belongs to follow from the edges."""
     everything = dict(placed)

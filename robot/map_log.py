@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.errors import BadSetting
-from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam, SlamConfig
+from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam, GrowingGmapping, SlamConfig
 from lemtomap.pipeline import Mapper
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.loops import LoopRecogniser
@@ -19,7 +19,7 @@ from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType, GridView, MapView, Odometry, Scan, SlamUpdate
 from robot import outputs
-from robot.final_map import FinalMap, final_map
+from robot.final_map import FinalMap, final_map, map_on_path
 from robot.logs import Log, open_log
 from robot.overview import Overview, WallSketch, draw
 from robot.progress import Bar
@@ -99,14 +99,16 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
         bar.say(f"{log.path}: {remark}")
     read_cpu_s = time.process_time() - begun_cpu_s
     with outputs.staged(options.out) as stage:
-        slam = _Timed(SLAMS[options.slam](config, options.seed))
+        grid = SLAMS[options.slam](config, options.seed)
+        slam = _Timed(grid)
         store = TopoStore.create(stage / "map.lemto", durable=False)
         # the growing grid closes its own loops and is far too large to search
         recogniser = None if options.slam == "gmapping" else LoopRecogniser()
         topo = TopoMapper(TopoConfig(), store, recogniser=recogniser)
         try:
             drive = _drive(log, Mapper(slam, topo), slam, bar)
-            final, view = final_map(topo), topo.view()
+            final = map_on_path(topo, grid.path()) if isinstance(grid, GrowingGmapping) else final_map(topo)
+            view = topo.view()
         finally:
             topo.close()
         summary = _summary(options, config, drive, final)

@@ -67,8 +67,11 @@ class SlamConfig:
     renew_rad: float = 2.0
 
     # particles
-    sample_share: float = 0.3  # of the proposal's standard deviation that is sampled
-    weight_per_quality: float = 200.0  # log weight for the whole step from quality 0 to 1
+    sample_share: float = 1.0  # of the proposal's standard deviation that is sampled
+    weight_per_quality: float = (
+        10.0  # log weight for the whole step from quality 0 to 1: beams err together, and
+    )
+    # a sharper weight would leave one line of descent long before a loop closes
     dethrone_ratio: float = 20.0  # another particle becomes the best only when it weighs this many times more
     resample_below: float = 0.5  # effective particles as a share of all
 

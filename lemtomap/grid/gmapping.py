@@ -20,6 +20,14 @@ from lemtomap.grid.window import Window
 from lemtomap.se2 import Pose
 
 
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """One pose of a particle's past; particles of one descent share it."""
+
+    T_grid_base: Pose
+    before: "Visit | None"
+
+
 @dataclass(slots=True)
 class Particle:
     """One hypothesis; the window may be shared with its siblings until it is written."""
@@ -27,6 +35,8 @@ class Particle:
     T_grid_base: Pose
     log_weight: float
     window: Window
+    past: Visit | None = None
+    """Kept only with a map that grows anyway."""
 
 
 class RollingGmapping(Tracker):

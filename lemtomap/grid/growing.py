@@ -6,6 +6,7 @@ much particles differ.
 """
 
 import math
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +14,17 @@ from numpy.typing import NDArray
 
 from lemtomap.grid import kernels
 from lemtomap.grid.config import SlamConfig
-from lemtomap.grid.gmapping import RollingGmapping
+from lemtomap.grid.gmapping import RollingGmapping, Visit
+from lemtomap.grid.matching import Match
+from lemtomap.grid.motion import between, compose
+from lemtomap.grid.scan import Beams
 from lemtomap.grid.window import LookUp, Scratch, Window, percent_table
 from lemtomap.se2 import Pose
-from lemtomap.types import GridView
+from lemtomap.types import GridView, Odometry, Scan, SlamUpdate
 
 TILE = 20  # cells; windows move by whole tiles
-Tile = tuple[NDArray[np.int8], NDArray[np.uint8], NDArray[np.uint16], NDArray[np.int8], NDArray[np.uint8]]
+PACK_LEVEL = 1  # of zlib: most cells of a tile are alike
+OCCUPIED = np.dtype([("averaged", "u1"), ("mean", "u2", 2), ("lift", "i1"), ("normal", "u1")])
 
 
 class ArchivedWindow(Window):
@@ -27,7 +32,7 @@ class ArchivedWindow(Window):
 
     def __init__(self, config: SlamConfig, tables: LookUp, scratch: Scratch) -> None:
         super().__init__(config, tables, scratch)
-        self.archive: dict[tuple[int, int], Tile] = {}
+        self.archive: dict[tuple[int, int], bytes] = {}
 
     def copy_from(self, other: Window) -> None:
         """Become equal to another window; archived tiles are shared."""
@@ -43,8 +48,10 @@ class ArchivedWindow(Window):
     def shift_to(self, origin: tuple[int, int]) -> None:
         """Move by whole tiles: what leaves is archived, what enters is fetched."""
         before = self._tiles()
-        leaving = {key: self._cut(key) for key in before - self._tiles(origin)}
-        self.archive.update({key: tile for key, tile in leaving.items() if tile[0].any()})
+        for key in before - self._tiles(origin):
+            tile = self._cut(key)
+            if tile is not None:
+                self.archive[key] = tile
         super().shift_to(origin)
         for key in self._tiles() - before:
             if key in self.archive:
@@ -60,23 +67,35 @@ class ArchivedWindow(Window):
         row, col = key[1] * TILE % n, key[0] * TILE % n
         return slice(row, row + TILE), slice(col, col + TILE)
 
-    def _cut(self, key: tuple[int, int]) -> Tile:
+    def _cut(self, key: tuple[int, int]) -> bytes | None:
+        """Return a tile packed, a few hundred bytes: evidence of every cell, the rest only of occupied ones.
+        None when nothing was seen there.
+        """
         at = self._slices(key)
-        arrays = self.arrays
-        return (
-            arrays.evidence[at].copy(),
-            arrays.averaged[at].copy(),
-            arrays.mean[at].copy(),
-            arrays.lift[at].copy(),
-            arrays.normal[at].copy(),
-        )
+        evidence = self.arrays.evidence[at]
+        if not evidence.any():
+            return None
+        occupied = evidence > 0
+        rest = np.empty(int(np.count_nonzero(occupied)), dtype=OCCUPIED)
+        for name in OCCUPIED.names or ():
+            rest[name] = getattr(self.arrays, name)[at][occupied]
+        return zlib.compress(evidence.tobytes() + rest.tobytes(), PACK_LEVEL)
 
-    def _paste(self, key: tuple[int, int], tile: Tile) -> None:
-        kernels.paste(self.arrays, self._tables.offsets, key[0] * TILE, key[1] * TILE, *tile)
+    def _paste(self, key: tuple[int, int], tile: bytes) -> None:
+        data = zlib.decompress(tile)
+        evidence = np.frombuffer(data, dtype=np.int8, count=TILE * TILE).reshape(TILE, TILE)
+        cells = np.zeros((TILE, TILE), dtype=OCCUPIED)
+        cells["normal"] = kernels.NONE
+        cells[evidence > 0] = np.frombuffer(data, dtype=OCCUPIED, offset=TILE * TILE)
+        rest = (np.ascontiguousarray(cells[name]) for name in OCCUPIED.names or ())
+        kernels.paste(self.arrays, self._tables.offsets, key[0] * TILE, key[1] * TILE, evidence, *rest)
 
     def tiles(self) -> dict[tuple[int, int], NDArray[np.int8]]:
         """Return the evidence of everything ever seen, by tile."""
-        seen = {key: tile[0] for key, tile in self.archive.items()}
+        seen = {
+            key: np.frombuffer(zlib.decompress(tile), dtype=np.int8, count=TILE * TILE).reshape(TILE, TILE)
+            for key, tile in self.archive.items()
+        }
         seen.update({key: self.arrays.evidence[self._slices(key)] for key in self._tiles()})
         return seen
 
@@ -88,6 +107,35 @@ class GrowingGmapping(RollingGmapping):
         tile_m = TILE * config.resolution_m
         whole = replace(config, window_m=math.ceil(config.window_m / tile_m + 1.0 - 1e-9) * tile_m)
         super().__init__(replace(whole, max_range_m=config.usable_range_m(config.window_m)), seed)
+        self._visits = 0
+        self._since: list[tuple[int, Pose]] = []  # per scan: visits so far, and the motion since the last
+
+    def update(self, scan: Scan, odometry: Odometry) -> SlamUpdate:
+        """Use one scan; see GridSlam.update."""
+        update = super().update(scan, odometry)
+        past = self._particles[self._best].past
+        assert past is not None  # noqa: S101
+        self._since.append((self._visits, between(past.T_grid_base, update.T_grid_base)))
+        return update
+
+    def path(self) -> NDArray[np.float64]:
+        """Return where the best particle believes each scan was taken, float64 (scans, 3), grid frame.
+
+        A particle is a whole path: when a loop closes, the one that drifted least wins with all of its past.
+        """
+        poses: list[Pose] = []
+        visit = self._particles[self._best].past
+        while visit is not None:
+            poses.append(visit.T_grid_base)
+            visit = visit.before
+        return np.array([compose(poses[-visits], since) for visits, since in self._since]).reshape(-1, 3)
+
+    def _integrate(self, beams: Beams, match: Match | None) -> Pose:
+        T_grid_base = super()._integrate(beams, match)
+        for particle in self._particles:
+            particle.past = Visit(particle.T_grid_base, particle.past)
+        self._visits += 1
+        return T_grid_base
 
     def view(self) -> GridView:
         """Return the best particle's whole map."""
