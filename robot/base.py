@@ -149,7 +149,8 @@ class BaseStep:
         sighting = bridge.deskewed_sighting(scan, poses)
         odometry = self._buffer.odometry_at(scan.stamp_s)
         valid = int(np.count_nonzero(~np.isnan(scan.ranges_m)))
-        timed = TimedScan(scan, odometry, sighting, seen.arrival_s, valid)
+        lifted = self._sample is not None and bool(self._sample.wheel_drop)
+        timed = TimedScan(scan, odometry, sighting, seen.arrival_s, valid, lifted)
         self._scan = timed
         if seen.complete:  # a damaged scan still shows obstacles, but never reaches the map
             self._exchange.scans.put(timed)

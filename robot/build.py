@@ -34,6 +34,6 @@ def build_core(
     store = make(map_path, durable=durable)
     recogniser = None if slam == "gmapping" else LoopRecogniser()  # a growing grid is too large to search
     mapper = TopoMapper(config.topo, store, recogniser=recogniser)
-    mapping = MappingStep(build_slam(slam, config, seed), mapper, exchange)
+    mapping = MappingStep(lambda: build_slam(slam, config, seed), mapper, exchange)
     navigation = NavigationStep(Navigator(config.nav), exchange, lambda: TopoReader(map_path))
     return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)

@@ -33,6 +33,8 @@ class TimedScan:
     """The same scan, de-skewed by odometry, base frame at the stamp."""
     arrival_s: float
     valid_beams: int
+    lifted: bool = False
+    """A wheel hung in the air: what odometry says is not true."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,15 @@
 """The mapping part of the robot: a scan in, a snapshot of the map out. One scan at a time."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.types import GridView, Odometry, Scan, SlamUpdate
+from lemtomap.topo.whereabouts import Watch
+from lemtomap.types import GridView, MapView, Odometry, Scan, SlamUpdate
 from robot.exchange import Exchange, Level, TimedScan
 
 
@@ -27,24 +30,59 @@ class GridSlam(Protocol):
 
 
 class MappingStep:
-    """Rolling-window SLAM, then topological SLAM."""
+    """Rolling-window SLAM, then topological SLAM; a new window and a new part of the map when carried."""
 
-    def __init__(self, slam: GridSlam, mapper: TopoMapper, exchange: Exchange) -> None:
-        self.slam, self.mapper = slam, mapper
+    def __init__(self, make_slam: Callable[[], GridSlam], mapper: TopoMapper, exchange: Exchange) -> None:
+        self.slam, self.mapper = make_slam(), mapper
         self.scans = 0
         """How many scans went into the map."""
+        self._make_slam = make_slam
         self._exchange = exchange
+        self._watch = Watch(mapper.config.watch)
+        self._lifted_since_s: float | None = None
         self._lost = False
         self._associated_id = 0
 
     def step(self, timed: TimedScan) -> None:
-        """Map one scan and publish what is known now."""
+        """Map one scan and publish what is known now; a robot in the air maps nothing."""
+        stamp_s = timed.scan.stamp_s
+        if timed.lifted:
+            self._hold(stamp_s)
+            return
+        if self._lifted_since_s is not None:
+            carried = stamp_s - self._lifted_since_s >= self._watch.config.carried_s
+            self._lifted_since_s = None
+            if carried:
+                self._lose(stamp_s, "carried elsewhere, or put back: wheels hung in the air")
         for event in self._exchange.nav_events.drain():
             self.mapper.apply(event)
         update = self.slam.update(timed.scan, timed.odometry)
+        moved = self._watch.displaced(update, timed.odometry)
+        if moved:
+            self._lose(stamp_s, moved)
+            update = self.slam.update(timed.scan, timed.odometry)
+        self.mapper.fit = self._watch.fit
         self.mapper.update(update, self.slam.view(), timed.sighting.hits_base)
         self.scans += 1
-        view = self.mapper.view(self.slam.particles())
+        self._publish(self.mapper.view(self.slam.particles()))
+
+    def _hold(self, stamp_s: float) -> None:
+        """Wait in the air; whoever looks at the map is told that the pose is worth nothing."""
+        if self._lifted_since_s is not None:
+            return
+        self._lifted_since_s = stamp_s
+        view = self._exchange.map_view.get()
+        if view is not None:
+            self._exchange.map_view.put(replace(view, quality=0.0))
+
+    def _lose(self, stamp_s: float, why: str) -> None:
+        """Begin with an empty window, in a part of the map of its own."""
+        self._exchange.note(stamp_s, "mapping", why, Level.WARN)
+        self.slam = self._make_slam()
+        self._watch.restart()
+        self.mapper.lose()
+
+    def _publish(self, view: MapView) -> None:
         if view.associated_id != self._associated_id:
             self._associated_id = view.associated_id
             self.mapper.store.commit()  # who plans from a node must find it and its edges in the file
@@ -54,7 +92,7 @@ class MappingStep:
             text, level = (
                 ("lost: looking for the place", Level.WARN) if view.lost else ("found again", Level.INFO)
             )
-            self._exchange.note(update.stamp_s, "mapping", text, level)
+            self._exchange.note(view.stamp_s, "mapping", text, level)
 
     def close(self) -> None:
         """Write the map to disk."""

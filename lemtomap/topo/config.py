@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from lemtomap.errors import BadSetting
 from lemtomap.topo.align import MatchConfig
+from lemtomap.topo.whereabouts import WatchConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,7 @@ class TopoConfig:
     place_alike_score: float = 0.8  # a visit that sees this share of a place finds it unchanged
     place_stale_visits: int = 3  # so many visits in a row that do not, and it is taken anew
     match: MatchConfig = field(default_factory=MatchConfig)
+    watch: WatchConfig = field(default_factory=WatchConfig)
     fresh_m: float = 10.0  # way after which a node's place in the window is measured again
     align_again_m: float = 0.3  # a refused match is tried again after this way
     align_widen: float = 2.0  # and its prediction believed that much less (variance), up to

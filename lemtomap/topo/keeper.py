@@ -52,6 +52,11 @@ class PlaceKeeper:
         if points_base is not None and len(points_base):
             self.hits.add(T_grid_base, points_base)
 
+    def forget_window(self) -> None:
+        """Begin with an empty window: the robot is somewhere else."""
+        self.hits = HitMap()
+        self._due.clear()
+
     def take_ripe(self, local: LocalMap, T_grid_base: Pose, grid: GridView, now_s: float) -> list[Taken]:
         """Take the data of due nodes that the robot has left behind or that soon must be measured again."""
         taken = []

@@ -20,10 +20,13 @@ from lemtomap.topo.protocols import NotStarted, Recogniser, Transform
 from lemtomap.topo.stand import last_stand, put_last_stand
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
+from lemtomap.topo.whereabouts import pose_quality
 from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
 
 COVARIANCE_FLOOR = np.diag([0.002**2, 0.002**2, np.deg2rad(0.1) ** 2])
 """No relation between two places is known better: a tenth of a grid cell's quantisation noise."""
+NOWHERE = np.diag([1e6, 1e6, 1e3])
+"""Of the first scan's place against the scan before: none, or one from where the robot was carried away."""
 
 
 @dataclass(slots=True)
@@ -61,9 +64,16 @@ class TopoMapper:
         self.keeper = PlaceKeeper(config, self.graph, recogniser.describe if recogniser else None)
         self.trail = ScanTrail.temporary() if trail is None else trail
         self.level = level
-        self.lost = False
         self.travelled_m = 0.0
         """Way of the base since the start, metres."""
+        self.turned_rad = 0.0
+        """Turning of the base since the start, either way."""
+        self.fit = 1.0
+        """How well the latest scan fits the window, as a share of what is usual; set by whoever watches."""
+        self.lost = False
+        """The robot does not know where in the map it is; it maps on in a part of its own."""
+        self.part_id = 1
+        """First node of the part of the graph made since the robot was lost or switched on."""
         self._recogniser = recogniser
         self._resume = resume
         self._neighbours = NeighbourFinder(config)
@@ -108,6 +118,7 @@ class TopoMapper:
         self.keeper.observe(slam.T_grid_base, points_base)
         if before is None:
             self._begin()
+            slam = replace(slam, step_covariance=NOWHERE)
         else:
             self._move(before.slam, slam)
             if grid is not before.grid:
@@ -126,9 +137,14 @@ class TopoMapper:
         """Stand where the map was left, or on a first node."""
         left = last_stand(self.store) if self._resume else None
         if left is None:
-            self._birth()
+            known = self._recogniser is not None and any(True for _ in self.store.places())
+            self.part_id = self._birth()
+            self.local.settle(self.part_id)
+            if known:
+                self._look_for_place()
             return
         node_id, T_node_base = left
+        self._resume = False
         slam = self._require().slam
         T_grid_node = compose(slam.T_grid_base, inverse(T_node_base))
         self.local.anchor(node_id, T_grid_node, _relative_to_window(slam))
@@ -140,6 +156,7 @@ class TopoMapper:
         from_base, to_base = before.T_grid_base, after.T_grid_base
         self._drift = kernels.drifted(self._drift, from_base, to_base, after.step_covariance)
         self.travelled_m += math.hypot(to_base[0] - from_base[0], to_base[1] - from_base[1])
+        self.turned_rad += abs(math.remainder(to_base[2] - from_base[2], math.tau))
         self.local.way_m = self.travelled_m
 
     def _associate_or_create(self) -> None:
@@ -314,12 +331,27 @@ class TopoMapper:
             self._create()
         return self._associated_id
 
-    def start_component(self) -> int:
-        """Start a new part of the graph here, joined to nothing yet (carried elsewhere); returns its node."""
+    def lose(self) -> None:
+        """Say that the robot is somewhere else now (carried, pushed away).
+
+        The next scan, from a window of its own, begins a new part of the graph, joined to nothing until a
+        closure joins it to the rest.
+        """
+        if self._now is None:
+            return
+        self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
+        self.keeper.forget_window()
         self.local.standings.clear()
-        node_id = self._birth()
-        self.local.settle(node_id)
-        return node_id
+        self._now, self._resume = None, False
+
+    def found(self) -> None:
+        """Say that the robot knows its place again, or that nothing of the map is known here."""
+        self.lost = False
+
+    def _look_for_place(self) -> None:
+        self.lost = True
+        if self._recogniser is not None:
+            self._recogniser.lost(self)
 
     def relocate(self, node_id: int, T_grid_node: Pose, covariance: Covariance) -> None:
         """Make a known node the associated one because it was recognised in the window."""
@@ -347,12 +379,19 @@ class TopoMapper:
             associated_id=self._associated_id,
             T_grid_node=poses,
             edges=self._picture.edges(self._associated_id),
-            quality=now.slam.quality,
+            quality=self._quality(),
             diversity=now.slam.diversity,
             lost=self.lost,
             particles=particles,
             names=names,
         )
+
+    def _quality(self) -> float:
+        """Return how likely T_node_base is right, 0 to 1; nothing is while the robot is lost."""
+        if self.lost:
+            return 0.0
+        measured = self._transform.measured
+        return pose_quality(self._drift, self.fit, measured=measured, config=self.config.watch)
 
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""

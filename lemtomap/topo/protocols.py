@@ -45,6 +45,10 @@ class Recogniser(Protocol):
         """A node was made or became the associated one."""
         ...
 
+    def lost(self, mapper: "TopoMapper") -> None:
+        """The robot does not know where in the map it is: nodes from `mapper.part_id` on are a part apart."""
+        ...
+
     def update(self, mapper: "TopoMapper") -> None:
-        """Work a slice after each scan; may call close_loop, revoke, start_component or relocate."""
+        """Work a slice after each scan; may call close_loop, revoke, relocate or found."""
         ...

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lemtomap.se2 import Pose, adjoint, between, compose
 from lemtomap.topo.graph import Covariance, chain_covariance
 from lemtomap.topo.loops.config import LoopConfig
-from lemtomap.topo.loops.descriptor import BYTES, describe, distances, unpack
+from lemtomap.topo.loops.descriptor import describe, distances
 from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis, Sighting
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
 from lemtomap.topo.loops.outlook import Outlook
@@ -24,6 +24,7 @@ from lemtomap.topo.paging import PagedGraph
 from lemtomap.types import GridView
 
 USUAL_UNLIKENESS = 45.0  # descriptor distance of two visits to one place
+TRIALS_KEPT = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,14 +98,26 @@ class LoopCloser:
         self._since_outlook = 0
         self._tasks: deque[_Task] = deque()
         self._tried: dict[int, float] = {}
-        self._descriptors: dict[int, NDArray[np.float32]] = {}
         self.log: Callable[[str], None] | None = None
 
-    def place_taken(self, node_id: int, descriptor: bytes) -> None:
-        """Take note of a node's localisation data, new or renewed."""
-        if len(descriptor) == BYTES:
-            self._descriptors[node_id] = unpack(descriptor)[0]
+    def place_taken(self, node_id: int) -> None:
+        """Take note that a node's localisation data is new or renewed."""
         self.places.forget(node_id)
+
+    def restart(self) -> None:
+        """Begin anew: the robot is in another part of the graph now, or two parts were joined."""
+        self.hypotheses.alive.clear()
+        self._tasks.clear()
+        self._tried.clear()
+        self._outlook = None
+        self.places.forget()
+
+    @property
+    def parts_known(self) -> int | None:
+        """How many nodes are joined to the robot's; None while that is not known or they are too many."""
+        outlook = self._outlook
+        known = outlook is not None and outlook.done and len(outlook) < self.config.gate.outlook_nodes
+        return len(outlook) if known and outlook is not None else None
 
     def at_node(self, situation: Situation, points_grid: NDArray[np.float64]) -> None:
         """Look for known places here: call when a node was made or became the associated one.
@@ -114,8 +127,7 @@ class LoopCloser:
         self._renew_outlook(situation.here_id)
         self.hypotheses.drop_old(situation.travelled_m)
         chosen = self._candidates(situation, points_grid)
-        chosen += self._strangers(situation, points_grid)
-        if situation.here_id not in situation.measured and situation.here_id in self._descriptors:
+        if situation.here_id not in situation.measured and self._has_place(situation.here_id):
             chosen.insert(0, situation.here_id)
         if not chosen and not self.hypotheses.alive:
             return
@@ -125,7 +137,7 @@ class LoopCloser:
             if box is None:
                 continue
             reference = reference or Reference(situation.grid, points_grid, self.config.match)
-            self._tried[node_id] = situation.travelled_m
+            self._note_trial(node_id, situation.travelled_m)
             way_m = self._way_m(situation.here_id, node_id)
             self._tasks.append(_Task(node_id, situation, reference, box, way_m))
         while len(self._tasks) > 4 * self.config.hearing:
@@ -162,8 +174,8 @@ class LoopCloser:
         near = [
             node_id
             for node_id in outlook.near(situation.here_id, robot[0], robot[1], gate.reach_m, gate.least_way_m)
-            if node_id in self._descriptors
-            and node_id not in situation.measured
+            if node_id not in situation.measured
+            and self._has_place(node_id)
             and situation.travelled_m - self._tried.get(node_id, -np.inf) >= self.config.again_after_m
             and self._way_m(situation.here_id, node_id) >= gate.least_way_m
         ]
@@ -171,32 +183,20 @@ class LoopCloser:
             return []
         base = situation.T_grid_base[:2]
         around = points_grid[np.abs(points_grid - base).max(axis=1) <= self.config.describe_m]
-        unlike = distances(describe(around), np.array([self._descriptors[node_id] for node_id in near]))
+        unlike = distances(describe(around), np.array([self.places.descriptor(node_id) for node_id in near]))
         doubt = np.array([outlook.offness(situation.here_id, node_id, robot) for node_id in near])
         order = np.argsort((unlike / USUAL_UNLIKENESS) ** 2 + doubt, kind="stable")
         return self._spaced([near[i] for i in order], self.config.candidates)
 
-    def _strangers(self, situation: Situation, points_grid: NDArray[np.float64]) -> list[int]:
-        """Return places of parts of the map that nothing joins to the robot's own, those most alike here.
+    def _has_place(self, node_id: int) -> bool:
+        return self.places.descriptor(node_id) is not None
 
-        So a robot switched on anywhere in a map, or carried elsewhere, finds itself again.
-        """
-        outlook = self._outlook
-        if outlook is None or not outlook.done or len(outlook) >= self.config.gate.outlook_nodes:
-            return []
-        unknown = [node_id for node_id in self._descriptors if node_id not in outlook]
-        if not unknown:
-            return []
-        base = situation.T_grid_base[:2]
-        around = points_grid[np.abs(points_grid - base).max(axis=1) <= self.config.describe_m]
-        unlike = distances(describe(around), np.array([self._descriptors[node_id] for node_id in unknown]))
-        return [unknown[i] for i in np.argsort(unlike, kind="stable")[: self.config.candidates]]
-
-    def _anywhere(self, situation: Situation) -> SearchBox:
-        """Return the box in which a place without any relation to here is searched: all round."""
-        half_m = self.config.stranger_box_m
-        x_m, y_m, _ = situation.T_grid_base.tolist()
-        return SearchBox(np.array([x_m, y_m, 0.0]), half_m, half_m, np.pi)
+    def _note_trial(self, node_id: int, travelled_m: float) -> None:
+        """Remember when a place was tried, for as long as that keeps it from being tried again."""
+        self._tried[node_id] = travelled_m
+        if len(self._tried) > TRIALS_KEPT:
+            since_m = travelled_m - self.config.again_after_m
+            self._tried = {tried_id: at_m for tried_id, at_m in self._tried.items() if at_m > since_m}
 
     def _way_m(self, here_id: int, node_id: int) -> float:
         """Return the way over edges to a node; a short one means that it lies in the window anyway."""
@@ -232,7 +232,7 @@ class LoopCloser:
             for node_id, T_seen_node in self.places.around(seen.node_id, 12.0, 48).items():
                 at = compose(seen.match.T_grid_place, T_seen_node)
                 gap_m = float(np.hypot(at[0] - base[0], at[1] - base[1]))
-                if gap_m < best_m and node_id in self._descriptors and node_id not in situation.measured:
+                if gap_m < best_m and node_id not in situation.measured and self._has_place(node_id):
                     best, best_m = node_id, gap_m
             if best and situation.travelled_m - self._tried.get(best, -np.inf) >= 0.5 * self.config.apart_m:
                 chosen.append(best)
@@ -249,8 +249,7 @@ class LoopCloser:
         outlook, gate = self._outlook, self.config.gate
         seen = None if outlook is None else outlook.between(situation.here_id, node_id)
         if seen is None:
-            joined = outlook is None or not outlook.done or node_id in outlook
-            return None if joined else self._anywhere(situation)
+            return None
         if situation.here_id not in situation.measured:
             gate = gate.unsure(situation.unsure_m)
         T_grid_node = compose(situation.T_grid_here, seen.T_from_node)
@@ -294,7 +293,7 @@ class LoopCloser:
                     f"sighting {task.situation.here_id}->{task.node_id} n={len(hypothesis.sightings)} {match}"
                 )
             if len(hypothesis.sightings) == 1:
-                hypothesis.needed = self.config.sightings + int(np.isinf(task.way_m))
+                hypothesis.needed = self.config.sightings
                 self._hear(task, hypothesis)
         if task.hearing_for is not None and not any(t.hearing_for is task.hearing_for for t in self._tasks):
             task.hearing_for.heard = True
@@ -329,7 +328,7 @@ class LoopCloser:
         here = task.situation
         T_here_node = between(here.T_grid_here, match.T_grid_place)
         covariance = chain_covariance(
-            _reversed(here.T_grid_here, here.covariance), match.T_grid_place, match.covariance
+            reversed_covariance(here.T_grid_here, here.covariance), match.T_grid_place, match.covariance
         )
         informs = here.here_id in here.measured and here.here_id != task.node_id
         return Sighting(task.node_id, match, here.here_id, T_here_node, covariance, here.travelled_m, informs)
@@ -345,12 +344,9 @@ class LoopCloser:
             rest = [
                 node_id
                 for node_id in near
-                if node_id not in same and node_id in self._descriptors and node_id not in situation.measured
+                if node_id not in same and node_id not in situation.measured and self._has_place(node_id)
             ]
             heard = self._spaced(rest, self.config.hearing)
-            if np.isinf(task.way_m):
-                others = self._strangers(situation, task.reference.points_grid)
-                heard += [node_id for node_id in others if node_id not in same]
         for node_id in heard:
             box = self._box(situation, node_id)
             if box is not None:
@@ -373,7 +369,7 @@ class LoopCloser:
         return closures
 
 
-def _reversed(T_a_b: Pose, covariance: Covariance) -> Covariance:
-    """Return the covariance of T_b_a (axes of a) from that of T_a_b (axes of b)."""
+def reversed_covariance(T_a_b: Pose, covariance: Covariance) -> Covariance:
+    """Return the covariance of T_b_a (axes of a) from that of T_a_b (axes of b), float64 (3, 3)."""
     turn = adjoint(T_a_b)
     return np.asarray(turn @ covariance @ turn.T)

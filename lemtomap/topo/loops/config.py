@@ -62,18 +62,52 @@ class GateConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class LocatorConfig:
+    """When a robot that does not know where it is has found out."""
+
+    match: MatchConfig = field(default_factory=lambda: MatchConfig(least_score=0.6))
+    """Of what is seen in a stored place: nearly all of it is there, even with a third of the chairs moved."""
+    first_score: float = (
+        0.75  # the first time round only what fits at a glance is looked for: three times faster
+    )
+    budget: int = 30_000  # bound evaluations in one update: 15 ms, of a robot that has nothing else to do
+    picture_work: int = 6_000  # what reading a place costs, in bound evaluations
+    candidates: int = 48  # places searched before the first answer, if the map has so many
+    leaves: int = 96  # of the index opened for one look-up: what is seen is only a part of the place
+    again_m: float = 0.7  # travel or ...
+    again_rad: float = 2.0  # ... turning after which a place may be tried again
+    spacing_m: float = 2.5  # a search covers the places this near over edges
+    box_m: float = 2.0  # half the side searched around a place
+    view_m: float = 5.0  # what is farther from the robot may lie beyond what is stored
+    view_points: int = 200
+    look_m: float = 0.35  # travel or ...
+    look_rad: float = 0.6  # ... turning between two looks
+    follow_m: float = 6.0  # a guess goes over to the nearest place within this way
+    plausible: float = 0.6  # fit of a new guess, ...
+    alive: float = 0.5  # ... of one that is kept, ...
+    fit: float = 0.85  # ... and of the one believed (measured in four buildings: right 0.9 to 1)
+    margin: float = 0.1  # by which every other must be worse (wrong ones: at best 0.86)
+    clear_margin: float = 0.2  # ... by which they are so much worse that half the travel will do
+    guesses: int = 12  # kept at most
+    checks: int = 3  # that a guess must have stood, ...
+    moved_m: float = 0.8  # ... over this travel ...
+    moved_rad: float = 5.5  # ... or nearly once round
+    unknown_m: float = 20.0  # travel after which this is taken for a part of the building not mapped yet
+
+
+@dataclass(frozen=True, slots=True)
 class LoopConfig:
     """When a place is believed to be one known before."""
 
     match: MatchConfig = field(default_factory=MatchConfig)
     gate: GateConfig = field(default_factory=GateConfig)
+    locator: LocatorConfig = field(default_factory=LocatorConfig)
     budget: int = 6_000  # bound evaluations in one update: 4 ms
     candidates: int = 3  # places searched at one event, the most alike and likely first
     hearing: int = 24  # ... and before a closure is committed: all others within the gate, up to this
     spacing_m: float = 1.5  # of places heard; a place covers its neighbours
     again_after_m: float = 2.0  # travel before a place that did not fit is tried again
     company_m: float = 7.0  # places this near over edges are searched as one
-    stranger_box_m: float = 5.0  # half the side searched for a place without any relation to here
     describe_m: float = 5.0  # half the side of what is compared: a node's localisation data reach as far
     search_points: int = 160  # a search needs no more; the alignment takes all
     score: float = 0.4  # a sighting: a rival of `rival` times this would have been seen

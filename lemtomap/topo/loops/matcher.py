@@ -140,9 +140,13 @@ class Search:
     reference: Reference
     points_place: Points
     box: SearchBox
+    least_score: float = 0.0
+    """Nothing below is looked for; at least what the settings say."""
     progress: Progress = Progress.SEARCHING
     match: Match | None = None
     work: int = 0
+    rival: Pose | None = None
+    """The best clearly different pose, to a search cell; None when nothing near as good was found."""
     _cells: Points = field(init=False)
     _range: NDArray[np.int64] = field(init=False)
     _away: NDArray[np.int64] = field(init=False)
@@ -169,7 +173,7 @@ class Search:
         self._away = np.zeros(6, dtype=np.int64)
         self._keys = np.empty(config.heap_blocks, dtype=np.int64)
         self._blocks = np.empty((config.heap_blocks, 4), dtype=np.int32)
-        self._least = int(config.least_score * 100 * max(1, len(self._cells)))
+        self._least = int(max(config.least_score, self.least_score) * 100 * max(1, len(self._cells)))
 
     def advance(self, budget: int) -> bool:
         """Do about `budget` bound evaluations more; return True when the search is over."""
@@ -215,18 +219,12 @@ class Search:
             self._first(key, col, row, angle)
         else:
             self._finish(state, key)
+            if self.match is not None and state == 1:
+                self.rival = self._pose(col, row, angle)
 
     def _first(self, key: int, col: int, row: int, angle: int) -> None:
-        config = self.reference.config
-        cell_m, grid = self.reference.cell_m, self.reference.grid
-        self._found = (
-            pose(
-                grid.origin_m[0] + col * cell_m,
-                grid.origin_m[1] + row * cell_m,
-                self._angle_0_rad + angle * self._angle_step_rad,
-            ),
-            key,
-        )
+        config, cell_m = self.reference.config, self.reference.cell_m
+        self._found = (self._pose(col, row, angle), key)
         near, turn = round(config.distinct_m / cell_m), round(config.distinct_rad / self._angle_step_rad)
         self._away = np.array(
             [col - near, col + near + 1, row - near, row + near + 1, angle - turn, angle + turn + 1],
@@ -234,6 +232,11 @@ class Search:
         )
         self._least = max(self._least, key // 2)
         self.progress = Progress.RIVAL
+
+    def _pose(self, col: int, row: int, angle: int) -> Pose:
+        cell_m, (x_m, y_m) = self.reference.cell_m, self.reference.grid.origin_m
+        turn_rad = self._angle_0_rad + angle * self._angle_step_rad
+        return pose(x_m + col * cell_m, y_m + row * cell_m, turn_rad)
 
     def _finish(self, state: int, key: int) -> None:
         self.progress = Progress.DONE

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, compose, transform
-from lemtomap.topo.loops.descriptor import ROW
+from lemtomap.topo.loops.descriptor import BYTES, ROW, unpack
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.place import decode_place
 
 T = TypeVar("T")
 Points = NDArray[np.float64]
 RASTER_M = 0.1  # of joined places: as fine as they are stored
+DESCRIPTORS_KEPT = 8192  # a fifth of a kilobyte each
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,19 +40,25 @@ class PlaceBook:
         self._kept = kept
         self._points: OrderedDict[int, Points | None] = OrderedDict()
         self._companies: OrderedDict[int, Company | None] = OrderedDict()
+        self._descriptors: OrderedDict[int, NDArray[np.float32] | None] = OrderedDict()
 
     def points(self, node_id: int) -> Points | None:
         """Return a node's obstacle points in its own frame, None when it has no localisation data."""
-        return _kept(self._points, node_id, self._kept, self._decode)
+        return kept(self._points, node_id, self._kept, self._decode)
 
     def company(self, node_id: int) -> Company | None:
         """Return a node's place joined with those around it; None when the node itself has none."""
-        return _kept(self._companies, node_id, self._kept, self._join)
+        return kept(self._companies, node_id, self._kept, self._join)
+
+    def descriptor(self, node_id: int) -> NDArray[np.float32] | None:
+        """Return what a node's place looks like, float32 (20,); None when it has no localisation data."""
+        return kept(self._descriptors, node_id, DESCRIPTORS_KEPT, self._describe)
 
     def forget(self, *node_ids: int) -> None:
         """Read these nodes afresh (and all companies, which they may belong to)."""
         for node_id in node_ids:
             self._points.pop(node_id, None)
+            self._descriptors.pop(node_id, None)
         self._companies.clear()
 
     def around(self, node_id: int, way_m: float, limit: int = 64) -> dict[int, Pose]:
@@ -61,6 +68,10 @@ class PlaceBook:
     def _decode(self, node_id: int) -> Points | None:
         place = self._graph.store.place(node_id)
         return None if place is None else decode_place(place.boundary).points.astype(np.float64)
+
+    def _describe(self, node_id: int) -> NDArray[np.float32] | None:
+        place = self._graph.store.place(node_id)
+        return None if place is None or len(place.descriptor) != BYTES else unpack(place.descriptor)[0]
 
     def _join(self, node_id: int) -> Company | None:
         own = self.points(node_id)
@@ -95,7 +106,8 @@ def chain(reached: dict[int, Reached]) -> dict[int, Pose]:
     return poses
 
 
-def _kept(cache: OrderedDict[int, T], key: int, size: int, make: Callable[[int], T]) -> T:
+def kept(cache: OrderedDict[int, T], key: int, size: int, make: Callable[[int], T]) -> T:
+    """Return what a cache of the last few things asked for holds, made anew when it does not."""
     if key not in cache:
         cache[key] = make(key)
         if len(cache) > size:

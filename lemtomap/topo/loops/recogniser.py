@@ -5,11 +5,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose
-from lemtomap.topo.graph import Place
-from lemtomap.topo.loops.closer import Closure, Confirmed, LoopCloser, Situation
+from lemtomap.se2 import Pose, between
+from lemtomap.topo.graph import Place, chain_covariance
+from lemtomap.topo.loops.closer import Closure, Confirmed, LoopCloser, Situation, reversed_covariance
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.descriptor import describe
+from lemtomap.topo.loops.index import PlaceIndex
+from lemtomap.topo.loops.locator import Located, Locator, Look
 
 if TYPE_CHECKING:
     from lemtomap.topo.mapper import TopoMapper
@@ -24,24 +26,37 @@ class LoopRecogniser:
         self.config = config or LoopConfig()
         self.closures: list[tuple[int, Closure]] = []
         """(edge ID, closure) of all that were committed."""
+        self.locator: Locator | None = None
+        """At work while a part of the map is not joined to the robot's."""
         self._closer: LoopCloser | None = None
+        self._index: PlaceIndex | None = None
         self._found: dict[int, Pose] = {}
         self._sure_m = 0.0
-        self._waiting: list[tuple[int, bytes]] = []
+        self._lost_m = 0.0
 
     def describe(self, points_node: NDArray[np.float64]) -> bytes:
         """Return the rotation-invariant descriptor of boundary points, float64 (N, 2), node frame."""
         return describe(points_node)
 
-    def place_taken(self, node_id: int, place: Place) -> None:
+    def place_taken(self, node_id: int, place: Place) -> None:  # noqa: ARG002 - read again from the file
         """Take note of a node's localisation data, new or renewed."""
-        if self._closer is None:
-            self._waiting.append((node_id, place.descriptor))
-        else:
-            self._closer.place_taken(node_id, place.descriptor)
+        if self._closer is not None:
+            self._closer.place_taken(node_id)
+
+    def lost(self, mapper: "TopoMapper") -> None:
+        """Look for the robot in all of the map but what it maps from now on."""
+        part_id = mapper.part_id
+        self._of(mapper).restart()
+        self._found.clear()
+        self._lost_m = mapper.travelled_m
+        self.locator = Locator(
+            self.config, mapper.graph, self._index_of(mapper), lambda node_id: node_id < part_id
+        )
 
     def at_node(self, mapper: "TopoMapper", *, born: bool) -> None:  # noqa: ARG002
         """Look for known places around a node that was made or became the associated one."""
+        if mapper.lost:
+            return
         slam, grid = mapper.now
         here_id = mapper.associated_id
         standing = mapper.local.standings[here_id]
@@ -64,6 +79,46 @@ class LoopRecogniser:
 
     def update(self, mapper: "TopoMapper") -> None:
         """Work a slice after each scan; closes loops."""
+        self._index_of(mapper).catch_up()
+        if self.locator is not None:
+            self._locate(mapper, self.locator)
+        if not mapper.lost:
+            self._close(mapper)
+
+    def _locate(self, mapper: "TopoMapper", locator: Locator) -> None:
+        """Look for the robot in the rest of the map; join the two when it is found."""
+        if locator.due(mapper.travelled_m, mapper.turned_rad):
+            slam, grid = mapper.now
+            x, y = slam.T_grid_base[:2].tolist()
+            points = mapper.keeper.hits.around((x, y), HITS_REACH_M, grid, mapper.config.occupied_from)
+            locator.look(Look(slam.T_grid_base, mapper.travelled_m, mapper.turned_rad, grid, points))
+        located = locator.update()
+        if located is not None:
+            self._join(mapper, located)
+        elif mapper.lost and mapper.travelled_m - self._lost_m > self.config.locator.unknown_m:
+            mapper.found()
+
+    def _join(self, mapper: "TopoMapper", located: Located) -> None:
+        """Join the robot's part of the map to where it was found, and stand there if it is near."""
+        here_id = mapper.associated_id
+        here = mapper.local.standings[here_id]
+        T_here_node = between(here.T_grid_node, located.T_grid_node)
+        doubt = reversed_covariance(here.T_grid_node, here.covariance)
+        covariance = chain_covariance(doubt, located.T_grid_node, located.covariance)
+        edge = mapper.close_loop(here_id, located.node_id, T_here_node, covariance)
+        T_grid_node, match = located.T_grid_node, located.match
+        closure = Closure(here_id, located.node_id, T_here_node, covariance, T_grid_node, match, informs=True)
+        self.closures.append((edge.edge_id, closure))
+        at = mapper.now[0].T_grid_base
+        gap_m = float(np.hypot(located.T_grid_node[0] - at[0], located.T_grid_node[1] - at[1]))
+        if gap_m <= mapper.config.new_node_distance_m:
+            mapper.relocate(located.node_id, located.T_grid_node, located.covariance)
+        self._anchor(mapper, Confirmed(located.node_id, located.T_grid_node, located.covariance))
+        self._of(mapper).restart()
+        self.locator = None
+        mapper.found()
+
+    def _close(self, mapper: "TopoMapper") -> None:
         closer = self._of(mapper)
         closures = closer.update()
         for closure in closures:
@@ -101,8 +156,9 @@ class LoopRecogniser:
     def _of(self, mapper: "TopoMapper") -> LoopCloser:
         if self._closer is None:
             self._closer = LoopCloser(self.config, mapper.graph)
-            for node_id, place in mapper.store.places():
-                self._closer.place_taken(node_id, place.descriptor)
-            for node_id, descriptor in self._waiting:
-                self._closer.place_taken(node_id, descriptor)
         return self._closer
+
+    def _index_of(self, mapper: "TopoMapper") -> PlaceIndex:
+        if self._index is None:
+            self._index = PlaceIndex.of_map(mapper.store)
+        return self._index

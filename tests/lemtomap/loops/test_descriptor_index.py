@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import transform
+from lemtomap.topo.graph import Place
+from lemtomap.topo.journal import recorded, undo
 from lemtomap.topo.loops.descriptor import BYTES, describe, distances, unpack
 from lemtomap.topo.loops.index import LEAF_ENTRIES, PlaceIndex
+from lemtomap.topo.store import TopoStore
 
 
 class Table:
@@ -81,3 +84,27 @@ def test_equal_descriptors_without_end_are_kept(table):
     for node_id in range(3 * LEAF_ENTRIES):
         index.add(node_id, bytes(BYTES))
     assert len(index.nearest(bytes(BYTES), 10**6)) == 3 * LEAF_ENTRIES
+
+
+def test_the_index_follows_what_anybody_writes_into_the_map(tmp_path):
+    codes = [describe(place(seed)) for seed in range(4)]
+    with TopoStore.create(tmp_path / "map.lemto") as store:
+        node_ids = [store.add_node().node_id for _ in codes]
+        store.put_place(node_ids[0], Place(0.0, b"", codes[0]))
+        index = PlaceIndex.of_map(store)
+        for node_id, code in zip(node_ids[1:], codes[1:], strict=True):
+            store.put_place(node_id, Place(0.0, b"", code))
+        assert index.catch_up()
+        assert [index.nearest(code, 1)[0].node_id for code in codes] == node_ids
+        with recorded(store, "delete") as edit:
+            edit.touch("place", node_ids[2])
+            edit.touch("node", node_ids[2])
+            store.delete_node(node_ids[2])
+        store.put_place(node_ids[1], Place(1.0, b"", codes[2]))
+        index.catch_up()
+        alike = index.nearest(codes[2], 9)
+        assert (alike[0].node_id, alike[0].distance) == (node_ids[1], 0.0)
+        assert len(alike) == 3
+        undo(store)
+        assert not PlaceIndex.of_map(store).catch_up(limit=1)
+        assert {each.node_id for each in index.nearest(codes[2], 2)} == {node_ids[1], node_ids[2]}

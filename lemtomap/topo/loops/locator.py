@@ -1,0 +1,309 @@
+"""Where in a known map is this? Start anywhere, carried elsewhere, lost (thesis, section 7-2).
+
+The robot maps on as if the place were new; meanwhile what it sees is searched for in the places of the rest
+of the map, those most alike first, a slice per scan. Each pose found is a guess that stands in the window,
+and is looked at again as the robot moves: does everything seen lie on what is stored, and does nothing stored
+lie where the robot looked through? The one guess that keeps fitting where all others fail is where it is.
+Two that fit alike are two: then the robot stays lost, for a wrong answer is worse than none.
+"""
+
+from collections import OrderedDict, deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.se2 import Pose, between, compose, inverse, transform
+from lemtomap.topo.graph import Covariance
+from lemtomap.topo.loops import kernels
+from lemtomap.topo.loops.config import LocatorConfig, LoopConfig
+from lemtomap.topo.loops.descriptor import describe
+from lemtomap.topo.loops.index import PlaceIndex
+from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
+from lemtomap.topo.loops.places import RASTER_M, Company, PlaceBook, kept
+from lemtomap.topo.paging import PagedGraph
+from lemtomap.types import GridView
+
+Points = NDArray[np.float64]
+RECENT = 3  # checks that tell how well a guess fits
+PICTURES_KEPT = 16  # 0.3 MB each
+BORDER_CELLS = 4  # round a stored place as a picture, so that a point beside it falls off its walls
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the robot sees at one moment."""
+
+    T_grid_base: Pose
+    travelled_m: float
+    turned_rad: float
+    grid: GridView
+    points_grid: Points
+    """Averaged hits in the window, float64 (N, 2), metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A known node found in the window for certain."""
+
+    node_id: int
+    T_grid_node: Pose
+    covariance: Covariance
+    """float64 (3, 3), axes of the node."""
+    match: Match
+
+
+@dataclass(slots=True)
+class Guess:
+    """One belief about where this is: a known node, and where in the window it stands then."""
+
+    node_id: int
+    T_grid_node: Pose
+    fits: list[float] = field(default_factory=list)
+    """How well each check bore it out, 1 for a perfect fit."""
+    match: Match | None = None
+    from_m: float = 0.0
+    """Way of the robot at the first check."""
+    from_rad: float = 0.0
+
+    @property
+    def fit(self) -> float:
+        """Mean fit of the latest checks: what is seen now decides, most was seen from there too."""
+        return float(np.mean(self.fits[-RECENT:]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """When a place was searched last, and how often."""
+
+    travelled_m: float
+    turned_rad: float
+    times: int
+
+
+NEVER = _Trial(-np.inf, -np.inf, 0)
+
+
+class Locator:
+    """Finds one robot that does not know where it is. Thrown away once it has."""
+
+    def __init__(
+        self, config: LoopConfig, graph: PagedGraph, index: PlaceIndex, is_known: Callable[[int], bool]
+    ) -> None:
+        """`is_known` tells the nodes of the map's other parts from those made since the robot got lost."""
+        self.config: LocatorConfig = config.locator
+        self._loops = config
+        self._index = index
+        self._is_known = is_known
+        self.places = PlaceBook(graph, config.company_m, config.search_points, kept=128)
+        self.guesses: list[Guess] = []
+        self.searched = 0
+        self._queue: deque[int] = deque()
+        self._search: tuple[int, _View, Search] | None = None
+        self._tried: dict[int, _Trial] = {}
+        self._pictures: OrderedDict[int, Reference] = OrderedDict()
+        self._view: _View | None = None
+        self._heard = 0
+        self._all_heard = False
+
+    def due(self, travelled_m: float, turned_rad: float) -> bool:
+        """Tell whether the robot has moved enough for another look."""
+        seen = None if self._view is None else self._view.look
+        return seen is None or (
+            travelled_m - seen.travelled_m >= self.config.look_m
+            or turned_rad - seen.turned_rad >= self.config.look_rad
+        )
+
+    def look(self, look: Look) -> None:
+        """Check all guesses against what is seen now, and line up the places to search."""
+        self._view = view = _View(look, self._loops, self.config)
+        for guess in self.guesses:
+            self._check(guess, view)
+        self.guesses = [guess for guess in self.guesses if guess.fit >= self.config.alive]
+        self._unite()
+        if view.has_structure and not self._queue and self._search is None:
+            self._line_up(view)
+
+    def update(self) -> Located | None:
+        """Search on for a slice; return where the robot is once that is certain."""
+        budget = self.config.budget
+        while budget > 0 and (self._search is not None or self._queue):
+            budget -= self._work(budget)
+        return self._certain()
+
+    # -- searching
+    # --------------------------------------------------------------------------------------------
+
+    def _line_up(self, view: "_View") -> None:
+        """Choose the places most alike, none beside another, those tried least first."""
+        count, look = self.config.candidates, view.look
+        covered: set[int] = set()
+        chosen: list[tuple[int, int, int]] = []
+        alikes = self._index.nearest(view.descriptor, 12 * count, leaves=self.config.leaves)
+        for rank, alike in enumerate(alikes):
+            node_id = alike.node_id
+            if node_id in covered or not self._is_known(node_id):
+                continue
+            covered.update(self.places.around(node_id, self.config.spacing_m, 24))
+            trial = self._tried.get(node_id, NEVER)
+            if (
+                look.travelled_m - trial.travelled_m >= self.config.again_m
+                or look.turned_rad - trial.turned_rad >= self.config.again_rad
+            ):
+                chosen.append((trial.times, rank, node_id))
+        self._queue.extend(node_id for _, _, node_id in sorted(chosen)[:count])
+        self._all_heard = self._all_heard or not self._queue
+
+    def _work(self, budget: int) -> int:
+        """Do a slice of the search under way, or begin the next; return the work spent."""
+        if self._search is None:
+            node_id, view = self._queue.popleft(), self._view
+            company = self.places.company(node_id)
+            if company is None or view is None or len(company.points_node) < self._loops.points:
+                return 1
+            times = self._tried.get(node_id, NEVER).times + 1
+            self._tried[node_id] = _Trial(view.look.travelled_m, view.look.turned_rad, times)
+            half_m = self.config.box_m
+            box = SearchBox(np.zeros(3), half_m, half_m, np.pi)
+            least = self.config.first_score if times == 1 else 0.0
+            self._search = node_id, view, Search(self._picture(company), view.search_points, box, least)
+            self.searched += 1
+            return self.config.picture_work
+        node_id, view, search = self._search
+        before = search.work
+        if search.advance(budget):
+            self._search = None
+            self._heard += 1
+            self._all_heard = self._all_heard or not self._queue
+            self._take(node_id, view, search)
+        return max(1, search.work - before)
+
+    def _picture(self, company: Company) -> Reference:
+        """Return a stored place as the fixed side of a search: walls, and nothing known of the rest."""
+        return kept(self._pictures, company.node_id, PICTURES_KEPT, lambda _: self._draw(company))
+
+    def _draw(self, company: Company) -> Reference:
+        cells = np.floor(company.points_node / RASTER_M).astype(np.int64)
+        low = cells.min(axis=0) - BORDER_CELLS
+        cols, rows = cells.max(axis=0) - low + BORDER_CELLS + 1
+        occupancy = np.full((rows, cols), -1, dtype=np.int8)
+        occupancy[cells[:, 1] - low[1], cells[:, 0] - low[0]] = 100
+        origin_m = (float(low[0]) * RASTER_M, float(low[1]) * RASTER_M)
+        view = GridView(0.0, occupancy, RASTER_M, origin_m)
+        return Reference(view, company.points_node, self.config.match)
+
+    def _take(self, node_id: int, view: "_View", search: Search) -> None:
+        """Make guesses of the best pose of a search and of its runner-up."""
+        if search.match is None:
+            return
+        found = [search.match.T_grid_place]
+        if search.rival is not None:
+            found.append(search.rival)
+        for T_node_base in found:
+            T_grid_node = compose(view.look.T_grid_base, inverse(T_node_base))
+            guess = Guess(node_id, T_grid_node, [], None, view.look.travelled_m, view.look.turned_rad)
+            self._check(guess, view)
+            if guess.fit >= self.config.plausible and not any(self._same(guess, g) for g in self.guesses):
+                self.guesses.append(guess)
+
+    # -- guesses
+    # ----------------------------------------------------------------------------------------------
+
+    def _check(self, guess: Guess, view: "_View") -> None:
+        """Go over to the known node nearest to the robot, align it, and see how well all fits."""
+        near = self._nearest(guess, view)
+        if near is not None:
+            guess.node_id, guess.T_grid_node = near
+        company = self.places.company(guess.node_id)
+        if company is None:
+            guess.fits.append(0.0)
+            return
+        match = view.reference.refine(company.points_node, guess.T_grid_node)
+        off = between(guess.T_grid_node, match.T_grid_place)
+        steady = np.hypot(off[0], off[1]) <= self._loops.agree_m and abs(off[2]) <= self._loops.agree_rad
+        if steady:
+            guess.match, guess.T_grid_node = match, match.T_grid_place
+        fit = view.explained_by(self._picture(company), guess.T_grid_node) - match.contradicted
+        guess.fits.append(fit if steady else 0.5 * fit)
+
+    def _nearest(self, guess: Guess, view: "_View") -> tuple[int, Pose] | None:
+        """Return the known node nearest to the robot under this guess, and where it stands."""
+        best: tuple[int, Pose] | None = None
+        best_m = np.inf
+        x_m, y_m, _ = view.look.T_grid_base.tolist()
+        for node_id, T_node_other in self.places.around(guess.node_id, self.config.follow_m, 48).items():
+            at = compose(guess.T_grid_node, T_node_other)
+            gap_m = float(np.hypot(at[0] - x_m, at[1] - y_m))
+            if gap_m < best_m and self.places.descriptor(node_id) is not None:
+                best, best_m = (node_id, at), gap_m
+        return best
+
+    def _same(self, a: Guess, b: Guess) -> bool:
+        """Tell whether two guesses put the robot at the same place of the map."""
+        T_a_b = self.places.around(a.node_id, self.config.follow_m, 48).get(b.node_id)
+        if T_a_b is None:
+            return False
+        off = between(compose(a.T_grid_node, T_a_b), b.T_grid_node)
+        return bool(
+            np.hypot(off[0], off[1]) <= 2.0 * self._loops.agree_m
+            and abs(off[2]) <= 2.0 * self._loops.agree_rad
+        )
+
+    def _unite(self) -> None:
+        """Keep the best guesses, each once, the one checked longest of those alike."""
+        kept: list[Guess] = []
+        for guess in sorted(self.guesses, key=lambda each: (-len(each.fits), -each.fit)):
+            if not any(self._same(guess, other) for other in kept):
+                kept.append(guess)
+        self.guesses = sorted(kept, key=lambda each: -each.fit)[: self.config.guesses]
+
+    def _certain(self) -> Located | None:
+        """Return the guess that keeps fitting while no other does; None while there is doubt."""
+        config, view = self.config, self._view
+        if view is None or not self.guesses or not (self._all_heard or self._heard >= config.candidates):
+            return None
+        best, *others = sorted(self.guesses, key=lambda guess: -guess.fit)
+        lead = best.fit - others[0].fit if others else 1.0
+        if best.match is None or lead < config.margin or not self._is_sound(best, best.match, view):
+            return None
+        needed_m = config.moved_m * (0.5 if lead >= config.clear_margin else 1.0)
+        moved_m = view.look.travelled_m - best.from_m
+        if moved_m < needed_m and view.look.turned_rad - best.from_rad < config.moved_rad:
+            return None
+        return Located(best.node_id, best.T_grid_node, best.match.covariance, best.match)
+
+    def _is_sound(self, guess: Guess, match: Match, view: "_View") -> bool:
+        """Tell whether a guess has borne every check of late, on walls that hold it in every direction."""
+        return (
+            len(guess.fits) >= self.config.checks
+            and min(guess.fits[-RECENT:]) >= self.config.fit
+            and match.weakest >= self._loops.weakest
+            and match.explained * match.known * len(view.points_base) >= self._loops.points
+        )
+
+
+class _View:
+    """One look, made ready: the window as a reference, and what stands around the robot in its frame."""
+
+    def __init__(self, look: Look, loops: LoopConfig, config: LocatorConfig) -> None:
+        self.look = look
+        self.reference = Reference(look.grid, look.points_grid, loops.match)
+        points = transform(inverse(look.T_grid_base), look.points_grid)
+        self.points_base: Points = points[np.hypot(points[:, 0], points[:, 1]) <= config.view_m]
+        self.search_points = np.ascontiguousarray(self.points_base[_every(len(self.points_base), config)])
+        around = np.abs(points).max(axis=1, initial=0.0) <= loops.describe_m
+        self.descriptor = describe(points[around])
+        self.has_structure = len(self.points_base) >= loops.points
+
+    def explained_by(self, picture: Reference, T_grid_node: Pose) -> float:
+        """Return the share of what is seen that lies on the walls of a stored place."""
+        T_node_base = between(T_grid_node, self.look.T_grid_base)
+        origin_m, points = picture.grid.origin_m, self.search_points
+        hit, _, _ = kernels.tally(points, T_node_base, picture.field, *origin_m, picture.cell_m)
+        return float(hit / max(1, len(points)))
+
+
+def _every(count: int, config: LocatorConfig) -> NDArray[np.int64]:
+    stride = max(1.0, count / config.view_points)
+    return np.unique(np.minimum(np.arange(0.0, count, stride), count - 1).astype(np.int64))

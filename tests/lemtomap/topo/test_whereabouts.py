@@ -1,0 +1,55 @@
+"""When somebody else has moved the robot, and what its pose is worth."""
+
+import numpy as np
+import pytest
+
+from lemtomap.topo.whereabouts import Watch, WatchConfig, pose_quality
+from lemtomap.types import Odometry
+from tests.lemtomap.topo.drive import said
+
+SURE = np.diag([1e-4, 1e-4, 1e-6])
+
+
+def told(watch, stamp_s, T_grid_base, T_odom_base, quality=0.94):
+    return watch.displaced(
+        said(stamp_s, np.array(T_grid_base, float), quality=quality),
+        Odometry(stamp_s, np.array(T_odom_base, float)),
+    )
+
+
+def driven(scans=20):
+    """A watch over a robot that has driven two metres, its odometry turned against the grid."""
+    watch = Watch()
+    for k in range(scans):
+        assert told(watch, 0.1 * k, [0.1 * k, 0.0, 0.0], [0.0, 0.1 * k, np.pi / 2]) == ""
+    return watch
+
+
+@pytest.mark.parametrize("jump", [[1.9 + 0.4, 0.0, 0.0], [1.9, 0.0, 0.4]], ids=["shifted", "turned"])
+def test_a_laser_that_leaps_where_no_wheel_turned_says_that_the_robot_was_moved(jump):
+    assert told(driven(), 2.0, jump, [0.0, 1.9, np.pi / 2]) != ""
+
+
+def test_a_small_push_that_fits_afterwards_is_followed():
+    at = [1.9, 0.12, 0.0]
+    assert told(driven(), 2.0, at, [0.0, 1.9, np.pi / 2]) == ""
+    assert told(driven(), 2.0, at, [0.0, 1.9, np.pi / 2], quality=0.7) != ""
+
+
+def test_people_may_stand_in_the_way_for_a_moment_but_not_for_good():
+    watch = driven()
+    answers = [told(watch, 2.0 + 0.1 * k, [1.9, 0, 0], [0, 1.9, np.pi / 2], 0.3) for k in range(12)]
+    assert answers[:9] == [""] * 9
+    assert answers[-1] != ""
+    watch.restart()
+    assert told(watch, 9.0, [50.0, 0.0, 0.0], [0.0, 1.9, np.pi / 2]) == ""
+
+
+def test_quality_falls_with_doubt_misfit_and_an_unproven_place():
+    config = WatchConfig()
+    best = pose_quality(SURE, 1.0, measured=True, config=config)
+    assert best > 0.95
+    assert pose_quality(SURE * 25, 1.0, measured=True, config=config) < 0.5
+    assert pose_quality(SURE, 0.6, measured=True, config=config) < 0.3
+    assert pose_quality(SURE, 1.0, measured=False, config=config) < 0.9
+    assert pose_quality(np.diag([1e-4, 1e-4, 0.03**2]), 1.0, measured=True, config=config) < 0.6

@@ -1,0 +1,97 @@
+"""A robot switched on somewhere in a map it knows, and carried elsewhere: lost, and right again."""
+
+import numpy as np
+import pytest
+
+from lemtomap.grid import SlamConfig, WindowMatcher
+from lemtomap.se2 import between, compose
+from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.loops import LoopRecogniser
+from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.store import TopoStore
+from robot.exchange import Exchange
+from robot.mapping import MappingStep
+from sim import worlds
+from sim.route import RoutePlanner
+from sim.tours import Tour
+from tools.sim_robot import SimRobot
+
+ROUND = [(2.0, 5.0), (2.9, 2.2), (5.4, 5.0), (5.4, 2.4), (13.5, 5.0), (14.0, 7.5)]
+
+
+class Mapping:
+    """A mapping robot on one map file, judged by truth."""
+
+    def __init__(self, robot, path, born):
+        store = (TopoStore.open if path.exists() else TopoStore.create)(path, durable=False)
+        mapper = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
+        self.exchange, self.robot, self.born = Exchange(), robot, born
+        self.step = MappingStep(lambda: WindowMatcher(SlamConfig()), mapper, self.exchange)
+        self.told = []
+
+    def take(self, scans, *, until_found=False):
+        for seen in scans:
+            self.step.step(seen.timed)
+            self.seen = seen
+            self.told += [note.text for note in self.exchange.notes.drain()]
+            view = self.view
+            if view is not None:
+                for node_id in view.T_grid_node:
+                    self.born.setdefault(node_id, compose(seen.T_world_base, self.seen_from_base(node_id)))
+            if until_found and not view.lost:
+                return True
+        return False
+
+    @property
+    def view(self):
+        return self.exchange.map_view.get()
+
+    def seen_from_base(self, node_id):
+        return between(self.view.T_grid_base, self.view.T_grid_node[node_id])
+
+    def off_m(self, node_id):
+        off = between(compose(self.seen.T_world_base, self.seen_from_base(node_id)), self.born[node_id])
+        return float(np.hypot(off[0], off[1]))
+
+
+@pytest.fixture(scope="module")
+def mapped(tmp_path_factory):
+    """The office, mapped once, and where each node truly is."""
+    path = tmp_path_factory.mktemp("lost") / "office.lemto"
+    world = worlds.load("office")
+    robot, born = SimRobot(world, seed=1), {}
+    mapping = Mapping(robot, path, born)
+    mapping.take(robot.stand(1.0))
+    mapping.take(robot.drive(Tour(RoutePlanner(world.raster).through(ROUND))))
+    mapping.step.close()
+    robot.close()
+    return world, path, born
+
+
+def test_a_carried_robot_says_so_and_finds_itself_again(mapped):
+    world, path, born = mapped
+    known = set(born)
+    robot = SimRobot(world, seed=2)
+    robot.put(np.array([5.4, 3.0, 2.0]))
+    mapping = Mapping(robot, path, dict(born))
+    mapping.take(robot.stand(1.0))
+    assert mapping.view.lost
+    assert mapping.view.quality == 0.0
+    way = Tour(RoutePlanner(world.raster).path((5.4, 3.0), (9.0, 5.0)))
+    assert mapping.take(robot.drive(way), until_found=True)
+    old = set(mapping.view.T_grid_node) & known
+    assert (
+        max(mapping.off_m(node_id) for node_id in old if mapping.step.mapper.standing(node_id).anchored) < 0.1
+    )
+
+    mapping.take(robot.carry(np.array([13.5, 5.2, -1.0])))
+    mapping.take(robot.stand(0.3))
+    assert mapping.view.lost
+    assert any("lost" in text for text in mapping.told)
+    way = Tour(RoutePlanner(world.raster).path((13.5, 5.2), (10.0, 5.0)))
+    assert mapping.take(robot.drive(way), until_found=True)
+    assert mapping.off_m(mapping.view.associated_id) < 0.1
+    joined = set(mapping.step.mapper.graph.reach(mapping.view.associated_id, 1e9))
+    assert len(joined) == mapping.step.mapper.store.count("node")
+    mapping.step.close()
+    robot.close()
