@@ -11,10 +11,12 @@ Leaves scale.md, scale.json and scale.png; a size that is done is not done again
 
 import argparse
 import json
+import sqlite3
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -74,8 +76,10 @@ def measure(km: float, driver: Driver, path: Path, first: bool) -> tuple[Driver,
 
 
 def _bytes(path: Path) -> int:
-    """Return the size of the map with what has not been folded into it yet."""
-    return sum(file.stat().st_size for file in path.parent.glob(f"{path.name}*"))
+    """Return the size of the map once everything written has been folded into it, as on closing."""
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    return path.stat().st_size
 
 
 def first_plan(path: Path, nodes: int) -> tuple[float, float]:
