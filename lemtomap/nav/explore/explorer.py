@@ -11,7 +11,7 @@ from lemtomap import se2
 from lemtomap.nav import kernels
 from lemtomap.nav.config import ExploreConfig, NavConfig
 from lemtomap.nav.costmap import Costmap
-from lemtomap.nav.explore.frontier import find_openings
+from lemtomap.nav.explore.frontier import find_openings, still_open, unseen_patches
 from lemtomap.nav.explore.memory import SeenMemory
 from lemtomap.nav.explore.openings import Openings
 from lemtomap.nav.metric import Reach, reach_from, top_cost
@@ -114,8 +114,9 @@ class Explorer:
         reach = reach_from(costs, T_grid_base)
         self._memory.take(costs, map_view.T_grid_node, T_grid_base)
         seen = self._memory.recall(costs, map_view.T_grid_node)
-        openings = find_openings(reach, seen, config.least_size_m, config.least_depth_m)
-        self._openings.match(openings, map_view.T_grid_node, costs, seen)
+        large = unseen_patches(seen, costs.resolution_m, config.least_depth_m)
+        openings = find_openings(reach, large, config.least_size_m)
+        self._openings.match(openings, map_view.T_grid_node, lambda place: still_open(costs, large, place))
         return reach
 
     def _judge(self, navigation: NavOutput | None, now_s: float) -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 I4 = NDArray[np.int32]
 U1 = NDArray[np.uint8]
 
-UNKNOWN = 1
+FREE, UNKNOWN, LETHAL = 0, 1, 2  # as in lemtomap.nav.kernels
 
 
 @njit(nogil=True, cache=True)
@@ -72,6 +72,40 @@ def frontier_cells(reach: U1, state: U1, large: U1, near: int) -> U1:
                     if large[rr, cc]:
                         out[r, c] = 1
     return out
+
+
+@njit(nogil=True, cache=True)
+def dark_in_sight(state: U1, large: U1, row: float, col: float, radius: float) -> bool:
+    """Tell whether a large unseen patch lies within radius (cells) of a place, not behind an obstacle.
+
+    The place is moved to the nearest free cell within the radius; without one nothing can be told: True.
+    """
+    height, width = state.shape
+    r0, r1 = max(0, int(row - radius)), min(height, int(row + radius) + 2)
+    c0, c1 = max(0, int(col - radius)), min(width, int(col + radius) + 2)
+    here_r, here_c, away = -1, -1, radius * radius
+    for r in range(r0, r1):
+        for c in range(c0, c1):
+            d2 = (r + 0.5 - row) ** 2 + (c + 0.5 - col) ** 2
+            if state[r, c] == FREE and d2 <= away:
+                here_r, here_c, away = r, c, d2
+    if here_r < 0:
+        return True
+    for r in range(r0, r1):
+        for c in range(c0, c1):
+            dr, dc = r - here_r, c - here_c
+            if not large[r, c] or dr * dr + dc * dc > radius * radius:
+                continue
+            steps = 2 * max(abs(dr), abs(dc))
+            clear = True
+            for k in range(1, steps):
+                rr, cc = round(here_r + dr * k / steps), round(here_c + dc * k / steps)
+                if state[rr, cc] == LETHAL:
+                    clear = False
+                    break
+            if clear:
+                return True
+    return False
 
 
 @njit(nogil=True, cache=True)

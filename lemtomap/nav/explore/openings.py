@@ -1,13 +1,12 @@
 """Placeholders: openings kept in the frames of nodes, so that they outlive the window (thesis, 7-2)."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap import se2
-from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore.frontier import Opening
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent, OpeningDone, OpeningSeen
@@ -66,12 +65,11 @@ class Openings:
         self,
         openings: Sequence[Opening],
         T_grid_node: Mapping[int, Pose],
-        costs: Costs,
-        seen: NDArray[np.uint8],
+        still_open: Callable[[NDArray[np.float64]], bool],
     ) -> None:
         """Join the openings in the window now with those known; drop known ones that turn out explored.
 
-        seen: uint8 (rows, cols), 1 where the ground is known or was known once.
+        still_open: tells of a place in the grid frame whether it may still lead to unseen ground.
         """
         places = {
             number: se2.transform(T_grid_node[kept.placeholder.node_id], _point(kept.placeholder))
@@ -88,7 +86,7 @@ class Openings:
             self._keep(number, opening, T_grid_node)
         for number, place in free.items():
             kept = self._kept[number]
-            if kept.placeholder.state == OpeningState.OPEN and _surroundings_known(costs, seen, place):
+            if kept.placeholder.state == OpeningState.OPEN and not still_open(place):
                 self.done(number, closed=False)
 
     def _keep(self, number: int | None, opening: Opening, T_grid_node: Mapping[int, Pose]) -> None:
@@ -145,12 +143,3 @@ def _nearest(p_grid: tuple[float, float], places: Mapping[int, np.ndarray]) -> i
         return None
     number = min(places, key=lambda n: float(np.hypot(*(places[n] - p_grid))))
     return number if np.hypot(*(places[number] - p_grid)) <= SAME_M else None
-
-
-def _surroundings_known(costs: Costs, seen: NDArray[np.uint8], p_grid: np.ndarray) -> bool:
-    """Tell whether a place lies well inside the window and all ground about it has been seen."""
-    if not costs.holds(p_grid, 0.5):
-        return False
-    row, col = costs.cell(p_grid)
-    r, c = int(row), int(col)
-    return bool(seen[r - 3 : r + 4, c - 3 : c + 4].mean() > 0.5)
