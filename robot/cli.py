@@ -14,8 +14,10 @@ import typer
 from drivers.errors import DriverError
 from lemtomap.errors import LemtomapError
 from robot import cli_doctor, cli_drive, cli_file, cli_map
+from robot.cli_help import Interrupted
 from sim.errors import SimError
 
+INTERRUPTED = 130  # as shells say it: 128 and SIGINT
 DEBUG_VARIABLE = "LEMTOMAP_DEBUG"  # set: show the traceback of an unexpected error
 
 app = typer.Typer(
@@ -61,13 +63,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
         return _fail(2, f"{place}{error.strerror or error}")
-    except (KeyboardInterrupt, typer.Abort):
-        return _fail(130, "interrupted")
+    except (KeyboardInterrupt, typer.Abort, Interrupted) as stopped:
+        return _fail(INTERRUPTED, str(stopped) or "interrupted")
     except Exception as error:  # noqa: BLE001 - the user gets one line, whatever it is
         if os.environ.get(DEBUG_VARIABLE):
             traceback.print_exc()
         return _fail(1, f"unexpected {type(error).__name__}: {error} ({DEBUG_VARIABLE}=1 shows where)")
-    return result if isinstance(result, int) else 0
+    code = result if isinstance(result, int) else 0
+    return _fail(code, "interrupted") if code == INTERRUPTED else code  # typer's own word for Ctrl-C
 
 
 def _usage(error: typer.TyperException) -> int:

@@ -13,3 +13,7 @@ def add(app: typer.Typer, command: Callable[..., Any], *examples: str, name: str
     brief = re.split(r"[:;.] ?", told)[0] + "."
     text = "\b\n" + "\n".join(examples) + "\n\n" + told
     app.command(name=name, help=text, short_help=brief)(command)
+
+
+class Interrupted(Exception):
+    """Ctrl-C, in words: what was stopped and what is left of it."""

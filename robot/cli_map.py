@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from robot.cli_help import add
+from robot.cli_help import Interrupted, add
 
 
 class Slam(StrEnum):
@@ -72,8 +72,11 @@ def map_(
 
     kind = slam or (Slam.WINDOW if particles is None else Slam.ROLLING)
     options = MapLogOptions(log, out, kind.value, particles, window, max_range, seed)
-    with progress_bar(f"mapping {log.name}") as bar:
-        told = map_log(options, bar)
+    try:
+        with progress_bar(f"mapping {log.name}") as bar:
+            told = map_log(options, bar)
+    except KeyboardInterrupt as stopped:
+        raise Interrupted(f"mapping of {log} interrupted; nothing was written to {out}") from stopped
     typer.echo(told)
 
 

@@ -1,4 +1,4 @@
-"""Measure exploration: floor seen, way driven against a greedy explorer that knows the plan, what stayed closed.
+"""Measure exploration: floor seen, and the way driven against a greedy explorer that knows the plan.
 
     lemtomap bench explore offices:30:1 --seeds 3
     lemtomap bench explore /data/maps/utexas_gdc_3/3.yaml --starts random --out runs/explore

@@ -117,8 +117,9 @@ class ExploreConfig:
     here_price_m: float = 3.0  # an opening beside the robot will mostly be seen in passing
     turn_price_m: float = 1.0  # turning right round costs about this much way
     window_first_m: float = 6.0  # look for openings beyond the window when none in it is nearer than this
-    patience_s: float = 240.0
-    pause_s: float = 60.0  # an opening that failed is left alone this long
+    patience_s: float = 240.0  # for one opening, and on top of that its way ...
+    slow_mps: float = 0.1  # ... at this speed; the navigator gives up much sooner, with a reason
+    pause_s: float = 65.0  # an opening that failed is left alone until a closed edge is tried again
     attempts: int = 2
     linger_s: float = 1.5  # having arrived, the mapper gets this long to see
     sure_looks: int = 4  # looks without any opening before saying that all is explored

@@ -184,3 +184,15 @@ def test_an_older_map_in_the_folder_is_not_overwritten(refused, tmp_path, termin
 def test_a_simulation_that_cannot_be_is_refused(refused, tmp_path, options, reason):
     assert reason in refused("sim", "--fast", "--out", tmp_path / "out", *options)
     assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_while_mapping_says_what_was_stopped_and_leaves_nothing(tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("robot.map_log.draw", interrupted)
+    log, out = write(tmp_path / "short.clf", SOUND), tmp_path / "out"
+    assert main(["map", str(log), "--out", str(out)]) == 130
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == f"lemtomap: mapping of {log} interrupted; nothing was written to {out}"
+    assert list(tmp_path.iterdir()) == [log]

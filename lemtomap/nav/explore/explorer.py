@@ -1,6 +1,5 @@
 """Exploration: goal after goal at unexplored openings, until none is left; says what stayed closed."""
 
-import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
@@ -8,13 +7,14 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from lemtomap import se2
-from lemtomap.nav import kernels
 from lemtomap.nav.config import ExploreConfig, NavConfig
 from lemtomap.nav.costmap import Costmap
 from lemtomap.nav.explore.frontier import find_openings, still_open, unseen_patches
 from lemtomap.nav.explore.memory import SeenMemory
 from lemtomap.nav.explore.openings import Openings
-from lemtomap.nav.metric import Reach, reach_from, top_cost
+from lemtomap.nav.explore.prices import Here, price_openings
+from lemtomap.nav.metric import Reach, reach_from
+from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.types import Goal, NavOutput, NavState
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent
@@ -49,7 +49,8 @@ class ExploreOutput:
 class _Pursuit:
     number: int
     goal: Goal
-    since_s: float
+    until_s: float
+    """When patience ends."""
     told_s: float
     """When the navigator was given the goal last."""
     arrived_s: float | None = None
@@ -97,12 +98,13 @@ class Explorer:
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
         reach = self._look(map_view, T_grid_base)
         self._judge(navigation, now_s)
-        goal = self._choose(map_view, graph, reach, T_grid_base, now_s)
-        self._empty_looks = 0 if self._openings.ready(now_s) else self._empty_looks + 1
+        fresh = FreshGraph(graph, map_view, self._nav.route.usual_speed_mps)
+        goal = self._choose(Here(map_view, fresh, reach, T_grid_base, now_s))
+        opened, _ = self._lists()
+        self._empty_looks = 0 if opened else self._empty_looks + 1
         done = self._empty_looks >= self.config.sure_looks
-        self._output = ExploreOutput(
-            goal, done, self._text(done), *self._lists(), self._openings.take_events()
-        )
+        text = self._text(now_s, done=done)
+        self._output = ExploreOutput(goal, done, text, *self._lists(), self._openings.take_events())
         return self._output
 
     def _look(self, map_view: MapView, T_grid_base: Pose) -> Reach:
@@ -129,11 +131,8 @@ class Explorer:
             return
         if navigation is None or navigation.stamp_s <= pursuit.told_s:
             return
-        late = now_s - pursuit.since_s > self.config.patience_s
-        if navigation.state == NavState.FAILED or late:
-            self._openings.failed(
-                pursuit.number, now_s, pause_s=self.config.pause_s, attempts=self.config.attempts
-            )
+        if navigation.state == NavState.FAILED or now_s > pursuit.until_s:
+            self._give_up(pursuit.number, now_s)
             self._pursuit = None
         elif navigation.state == NavState.ARRIVED:
             pursuit.arrived_s = now_s if pursuit.arrived_s is None else pursuit.arrived_s
@@ -141,26 +140,28 @@ class Explorer:
                 self._openings.spend(pursuit.number)
                 self._pursuit = None
 
-    def _choose(
-        self, map_view: MapView, graph: RouteGraph, reach: Reach, T_grid_base: Pose, now_s: float
-    ) -> Goal | None:
+    def _give_up(self, number: int, now_s: float) -> None:
+        self._openings.failed(number, now_s, pause_s=self.config.pause_s, attempts=self.config.attempts)
+
+    def _choose(self, here: Here) -> Goal | None:
         """Return a new goal if another opening is to be pursued, or the pursued one has moved."""
-        ready = self._openings.ready(now_s)
-        if self._pursuit is not None and self._pursuit.arrived_s is not None:
-            return self._face(self._pursuit, now_s)
+        pursuit = self._pursuit
+        if pursuit is not None and pursuit.arrived_s is not None:
+            return self._face(pursuit, here.now_s)
+        ready = self._openings.ready(here.now_s)
         if not ready:
             return None
-        prices = self._prices(ready, map_view, graph, reach, T_grid_base)
+        prices = price_openings(ready, here, self.config)
         if not prices:
-            attempts = self.config.attempts
             for placeholder in ready:
-                self._openings.failed(placeholder.placeholder_id, now_s, pause_s=0.0, attempts=attempts)
+                self._give_up(placeholder.placeholder_id, here.now_s)
             return None
         number = min(prices, key=lambda n: prices[n])
-        pursued = None if self._pursuit is None else prices.get(self._pursuit.number)
-        if self._pursuit is not None and pursued is not None:
-            number = number if prices[number] < self.config.switch_share * pursued else self._pursuit.number
-        return self._pursue(next(p for p in ready if p.placeholder_id == number), now_s)
+        pursued = None if pursuit is None else prices.get(pursuit.number)
+        if pursuit is not None and pursued is not None:
+            number = number if prices[number] < self.config.switch_share * pursued else pursuit.number
+        opening = next(p for p in ready if p.placeholder_id == number)
+        return self._pursue(opening, prices[number], here.now_s)
 
     def _face(self, pursuit: _Pursuit, now_s: float) -> Goal | None:
         """Return, once, the goal to look into the opening from where the robot arrived."""
@@ -172,100 +173,31 @@ class Explorer:
             pursuit.goal, yaw_node_rad=opening.yaw_rad, tolerance_m=2.0 * self.config.goal_tolerance_m
         )
 
-    def _pursue(self, opening: Placeholder, now_s: float) -> Goal | None:
+    def _pursue(self, opening: Placeholder, price_m: float, now_s: float) -> Goal | None:
         """Return the goal at an opening if the navigator is not on its way there already."""
         goal = Goal(opening.node_id, (opening.x_m, opening.y_m), None, self.config.goal_tolerance_m)
+        until_s = now_s + self.config.patience_s + price_m / self.config.slow_mps
         pursuit = self._pursuit
         if pursuit is None or pursuit.number != opening.placeholder_id:
-            self._pursuit = _Pursuit(opening.placeholder_id, goal, now_s, now_s)
+            self._pursuit = _Pursuit(opening.placeholder_id, goal, until_s, now_s)
             return goal
         if _same_place(pursuit.goal, goal):
             return None
-        pursuit.goal, pursuit.told_s = goal, now_s
+        pursuit.goal, pursuit.told_s, pursuit.until_s = goal, now_s, until_s
         return goal
-
-    def _prices(
-        self,
-        ready: Sequence[Placeholder],
-        map_view: MapView,
-        graph: RouteGraph,
-        reach: Reach,
-        T_grid_base: Pose,
-    ) -> dict[int, float]:
-        """Return the price in metres of way of each opening within reach, in the window or by route."""
-        costs = reach.costs
-        row, col = costs.cell(T_grid_base)
-        start = np.array([int(row) * costs.state.shape[1] + int(col)], dtype=np.int64)
-        field_cells = kernels.march(costs.cost, start, np.zeros(1), -1, 0.0, top_cost(costs))
-        prices: dict[int, float] = {}
-        away: list[Placeholder] = []
-        for placeholder in ready:
-            price_m = self._price_in_window(placeholder, map_view, reach, field_cells, T_grid_base)
-            if price_m is None:
-                away.append(placeholder)
-            else:
-                prices[placeholder.placeholder_id] = price_m
-        if away and (not prices or min(prices.values()) > self.config.window_first_m):
-            prices.update(_price_by_route(away, graph, map_view.associated_id))
-        return prices
-
-    def _price_in_window(
-        self,
-        placeholder: Placeholder,
-        map_view: MapView,
-        reach: Reach,
-        field_cells: np.ndarray,
-        T_grid_base: Pose,
-    ) -> float | None:
-        T_grid_node = map_view.T_grid_node.get(placeholder.node_id)
-        if T_grid_node is None:
-            return None
-        place = se2.transform(T_grid_node, [placeholder.x_m, placeholder.y_m])
-        if not reach.costs.holds(place):
-            return None
-        found = reach.nearest(place, self.config.goal_tolerance_m)
-        if found is None:
-            return None
-        way_m = float(field_cells[found[0], found[1]]) * reach.costs.resolution_m
-        dx, dy = place - T_grid_base[:2]
-        if np.hypot(dx, dy) <= self.config.goal_tolerance_m:
-            way_m += self.config.here_price_m
-        turn_rad = abs(float(se2.wrap_angle(np.arctan2(dy, dx) - T_grid_base[2])))
-        return way_m + self.config.turn_price_m * turn_rad / np.pi if np.isfinite(way_m) else None
 
     def _lists(self) -> tuple[tuple[Placeholder, ...], tuple[Placeholder, ...]]:
         state = self._openings.of_state
         return tuple(state(OpeningState.OPEN)), tuple(state(OpeningState.CLOSED))
 
-    def _text(self, done: bool) -> str:  # noqa: FBT001 - says itself
+    def _text(self, now_s: float, *, done: bool) -> str:
         opened, closed = self._lists()
         if done:
             return f"explored everything; {len(closed)} openings stayed closed"
+        if opened and not self._openings.ready(now_s):
+            return f"waiting to try {len(opened)} openings again, {len(closed)} closed"
         return f"{len(opened)} openings to explore, {len(closed)} closed"
 
 
 def _same_place(a: Goal, b: Goal) -> bool:
     return a.node_id == b.node_id and float(np.hypot(*np.subtract(a.p_node, b.p_node))) < 0.25
-
-
-def _price_by_route(openings: Sequence[Placeholder], graph: RouteGraph, start_id: int) -> dict[int, float]:
-    """Return the price of the one opening outside the window that is nearest along the edges."""
-    wanted: dict[int, list[Placeholder]] = {}
-    for placeholder in openings:
-        wanted.setdefault(placeholder.node_id, []).append(placeholder)
-    best = {start_id: 0.0}
-    heap = [(0.0, start_id)]
-    settled: set[int] = set()
-    while heap:
-        way_m, node_id = heapq.heappop(heap)
-        if node_id in settled:
-            continue
-        settled.add(node_id)
-        if node_id in wanted:
-            return {p.placeholder_id: way_m + float(np.hypot(p.x_m, p.y_m)) for p in wanted[node_id]}
-        for edge in graph.edges_of(node_id):
-            further_m = way_m + edge.length_m
-            if further_m < best.get(edge.other_id, np.inf):
-                best[edge.other_id] = further_m
-                heapq.heappush(heap, (further_m, edge.other_id))
-    return {}

@@ -51,10 +51,12 @@ class Openings:
         return [kept.placeholder for kept in self._kept.values() if kept.placeholder.state == state]
 
     def ready(self, now_s: float) -> list[Placeholder]:
-        """Return the open placeholders worth trying now; lately failed ones only when no other is left."""
-        unclosed = [k for k in self._kept.values() if k.placeholder.state == OpeningState.OPEN]
-        fresh = [k for k in unclosed if k.not_before_s <= now_s]
-        return [kept.placeholder for kept in fresh or unclosed]
+        """Return the open placeholders worth trying now, which lately failed ones are not."""
+        return [
+            kept.placeholder
+            for kept in self._kept.values()
+            if kept.placeholder.state == OpeningState.OPEN and kept.not_before_s <= now_s
+        ]
 
     def get(self, placeholder_id: int) -> Placeholder | None:
         """Return a placeholder that is still kept."""
