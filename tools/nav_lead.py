@@ -5,12 +5,13 @@ and to judge, never by the robot.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.se2 import Pose
@@ -64,7 +65,7 @@ class Rig:
 
         return run_lockstep(self.simulator, self.core, mission, limit_s, watch=each)
 
-    def lead(self, path: np.ndarray) -> Ended:
+    def lead(self, path: NDArray[np.float64]) -> Ended:
         """Take the robot along a path, float64 (N, 2), world metres."""
         tour = Tour(path)
 
@@ -81,12 +82,10 @@ class Rig:
             truth = self.simulator.truth().T_world_base
             self.T_world_node[view.associated_id] = se2.compose(truth, T_base_node)
 
-    def nearest_node(self, point: Sequence[float]) -> int:
+    def nearest_node(self, point: NDArray[np.float64]) -> int:
         """Return the node that truly lies nearest to a point of the world."""
         places = self.T_world_node
-        return min(
-            places, key=lambda node_id: float(np.hypot(*(places[node_id][:2] - np.asarray(point)[:2])))
-        )
+        return min(places, key=lambda node_id: float(np.hypot(*(places[node_id][:2] - point[:2]))))
 
     def close(self) -> None:
         """Close the map and free the simulator."""
@@ -112,7 +111,7 @@ def camera_of(simulator: Simulator, core: RobotCore) -> DepthFeed:
     return DepthFeed(lambda: camera.points_base(simulator.depth_image()), core.exchange)
 
 
-def round_trip(world: World, spacing_m: float = PLACES_M) -> np.ndarray:
+def round_trip(world: World, spacing_m: float = PLACES_M) -> NDArray[np.float64]:
     """Return a path through every place of a building, nearest first by the way, and back to the start."""
     planner = RoutePlanner(world.raster)
     here = home = (world.spawn[0], world.spawn[1])

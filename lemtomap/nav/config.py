@@ -81,6 +81,7 @@ class RecoveryConfig:
     back_off_m: float = 0.40
     back_off_s: float = 5.0
     back_off_mps: float = 0.10
+    barred_patience_s: float = 20.0  # with no other way, what stands in the only one is given this long
     block_s: float = 60.0  # a closed edge is tried again after this
     lost_patience_s: float = 20.0
     attempts: int = 2  # times through the ladder before giving up ...

@@ -15,7 +15,7 @@ from lemtomap import se2
 from lemtomap.errors import NoRoute
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.follower import Follower, Motion, Step
-from lemtomap.nav.metric import MetricPlan
+from lemtomap.nav.metric import MetricPlan, reach_from
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
 from lemtomap.nav.outlook import FarLook, Outlook, WindowLook, look_near, outdated
@@ -86,12 +86,14 @@ class Navigator:
         self._goal = Goal(goal) if isinstance(goal, int) else goal
         self._way.route, self._plan, self._outlook = None, None, None
         self._waiting_s = self._lost_s = self._shut_since_s = None
+        self._planned_s = -np.inf
         self._follower.restart()
         if stayed:
             self._progress.move_goal()
             return
         self._way_back.start_leg()
         self._way.barriers.reset()
+        self._way.barred_s = None
         self._ladder.reset()
         self._progress.restart(now_s)
 
@@ -161,7 +163,7 @@ class Navigator:
             route = self._way.keep(goal, moment)
             self._look(goal, route, moment)
         except NoRoute as error:
-            return self._fail(moment, Reason.NO_ROUTE, str(error))
+            return self._no_route(moment, str(error))
         if self._way.route is None:  # an edge was closed: look for another way at once
             return self._act(moment)
         if self._goal_is_shut(route, moment):
@@ -207,6 +209,20 @@ class Navigator:
         """The way is another one now: what was measured along the old one no longer counts."""
         self._plan, self._outlook, self._waiting_s = None, None, None
         self._progress.restart(now_s)
+
+    def _no_route(self, moment: Moment, text: str) -> NavOutput:
+        """Refuse, unless what bars the way came just now and may go again, or is seen to be gone."""
+        barred_s, patience_s = self._way.barred_s, self.config.recovery.barred_patience_s
+        if moment.now_s - self._planned_s >= self.config.plan_period_s - 1e-6:
+            self._planned_s = moment.now_s
+            costs = self.surroundings.costs(moment.map_view, moment.T_grid_base, moment.now_s)
+            if self._way.reopen(reach_from(costs, moment.T_grid_base), moment):
+                barred_s = moment.now_s
+        if barred_s is None or moment.now_s - barred_s > patience_s:
+            return self._fail(moment, Reason.NO_ROUTE, text)
+        self._start_over(moment.now_s)
+        twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
+        return self._output(moment, twist, NavState.WAITING, Reason.OBSTACLE, f"{text}: waiting")
 
     def _goal_is_shut(self, route: Route, moment: Moment) -> bool:
         """Tell whether the robot has stood at the goal's node for a while with no way to the goal itself."""

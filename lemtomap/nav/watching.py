@@ -1,5 +1,6 @@
 """Watching edges: how long each takes to drive, and whether a barrier across one is a door or a person."""
 
+import math
 from collections import deque
 from collections.abc import Container
 
@@ -8,7 +9,7 @@ import numpy as np
 from lemtomap.nav import kernels
 from lemtomap.nav.config import RecoveryConfig
 from lemtomap.nav.metric import Reach
-from lemtomap.nav.sliding import SNAP_M, Barrier
+from lemtomap.nav.sliding import SNAP_M, Barrier, cut_at
 from lemtomap.nav.types import Points
 from lemtomap.topo.events import EdgeTraversed
 from lemtomap.types import MapView, RouteGraph
@@ -20,6 +21,8 @@ MEMORY_S = 0.8
 MOVED_M = 0.10
 """... if it was elsewhere by this much: more than the noise of a URG-04LX."""
 MOVED_HITS = 4
+SAME_BARRIER_M = 0.8
+"""Obstacles on two edges this near to one another are one door, one chair, one person."""
 
 
 class EdgeClock:
@@ -108,8 +111,11 @@ Link = tuple[int, int, int]
 """Edge id and its two nodes."""
 
 
-def links_cut(map_view: MapView, reach: Reach, border_m: float) -> list[Link]:
-    """Return the edges in the window that join a place the robot can reach with one it cannot."""
+def links_cut(map_view: MapView, reach: Reach, barrier: Barrier, border_m: float) -> list[Link]:
+    """Return the edges in the window that the same barrier cuts.
+
+    These join a place the robot can reach with one it cannot, or have an obstacle on their line right there.
+    """
     open_of: dict[int, bool] = {}
     for node_id, T_grid_node in map_view.T_grid_node.items():
         if reach.costs.holds(T_grid_node, border_m):
@@ -117,8 +123,15 @@ def links_cut(map_view: MapView, reach: Reach, border_m: float) -> list[Link]:
     return [
         (edge_id, a, b)
         for edge_id, a, b, _ in map_view.edges
-        if a in open_of and b in open_of and open_of[a] != open_of[b]
+        if a in open_of
+        and b in open_of
+        and (open_of[a] != open_of[b] or _cut_there(a, b, map_view, reach, barrier))
     ]
+
+
+def _cut_there(a: int, b: int, map_view: MapView, reach: Reach, barrier: Barrier) -> bool:
+    stands = cut_at(reach.costs, map_view.T_grid_node[a], map_view.T_grid_node[b])
+    return stands is not None and math.dist(stands, barrier.p_middle_grid) < SAME_BARRIER_M
 
 
 def links_open_again(closed: Container[int], map_view: MapView, reach: Reach) -> list[Link]:

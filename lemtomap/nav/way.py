@@ -44,6 +44,8 @@ class WayKeeper:
         self._closed_s: dict[int, float] = {}
         self.route: Route | None = None
         """None: to be planned anew."""
+        self.barred_s: float | None = None
+        """When the way under way was barred last, or seen to open again; None: not since the goal was set."""
         self.barriers = BarrierWatch(config.recovery)
 
     def keep(self, goal: Goal, moment: Moment) -> Route:
@@ -67,9 +69,7 @@ class WayKeeper:
 
         Returns where that barrier stands, in the grid frame; the route is then to be planned anew.
         """
-        for edge_id, a, b in links_open_again(self._closed_s, moment.map_view, reach):
-            del self._closed_s[edge_id]
-            moment.events.append(EdgeBlocked(a, b, 0.0))
+        self.reopen(reach, moment)
         route, places = self.route, moment.map_view.T_grid_node
         if route is None or (target is None and reach.area_m2() < SHUT_IN_M2):
             return None  # shut in by something near: no edge is to blame
@@ -86,8 +86,17 @@ class WayKeeper:
         if not self.barriers.closed(barrier, moment.now_s, near=near):
             return None
         on_route = (barrier.edge_id, route.nodes[barrier.index], route.nodes[barrier.index + 1])
-        self._close([on_route, *links_cut(moment.map_view, reach, BORDER_M)], moment)
+        self._close([on_route, *links_cut(moment.map_view, reach, barrier, BORDER_M)], moment)
         return barrier.p_middle_grid
+
+    def reopen(self, reach: Reach, moment: Moment) -> bool:
+        """Open closed edges that are seen to be free; tell whether there were any."""
+        links = links_open_again(self._closed_s, moment.map_view, reach)
+        for edge_id, a, b in links:
+            del self._closed_s[edge_id]
+            moment.events.append(EdgeBlocked(a, b, 0.0))
+            self.barred_s = moment.now_s  # the map will hear of it in a moment
+        return bool(links)
 
     def close_next(self, moment: Moment) -> bool:
         """Close the first edge of the route; False when there is none."""
@@ -103,5 +112,6 @@ class WayKeeper:
         for edge_id, a, b in {link[0]: link for link in links}.values():
             self._closed_s[edge_id] = until_s
             moment.events.append(EdgeBlocked(a, b, until_s))
+        self.barred_s = moment.now_s
         self.route = None
         self.barriers.reset()
