@@ -20,6 +20,7 @@ from lemtomap.topo.protocols import NotStarted, Recogniser, Transform
 from lemtomap.topo.stand import last_stand, put_last_stand
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
+from lemtomap.topo.undoing import cut_off
 from lemtomap.topo.whereabouts import pose_quality
 from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
 
@@ -312,14 +313,23 @@ class TopoMapper:
         self.local.settle(self._associated_id)
         return edge
 
-    def revoke(self, edge_id: int) -> None:
-        """Take back a closure. What its acceptance made the window believe is measured again."""
-        edge = self.store.edge(edge_id)
-        if edge is None:
+    def revoke(self, *edge_ids: int) -> None:
+        """Take back closures, with what they made the window believe and what grew from them since."""
+        edges = [edge for edge_id in edge_ids if (edge := self.store.edge(edge_id)) is not None]
+        if not edges:
             return
-        self.graph.delete_edge(edge)
+        for edge in edges:
+            self.graph.delete_edge(edge)
         self.local.release_matched()
+        cut_off(self.graph, self.local, min(edge.edge_id for edge in edges), COVARIANCE_FLOOR)
+        self._associated_id = self._own_nearest() or self._associated_id
         self.local.settle(self._associated_id)
+        self._align_associated()
+
+    def _own_nearest(self) -> int:
+        """Return the nearest node born in this window, 0 when it holds none."""
+        own = [n for n, standing in self.local.standings.items() if standing.born and standing.anchored]
+        return min(own, key=self._distance_m, default=0)
 
     def change_level(self, level: int) -> int:
         """Say that the robot is on another level now (a lift, the end of a ramp); returns its first node.

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, adjoint, between, compose
 from lemtomap.topo.graph import Covariance, chain_covariance
+from lemtomap.topo.loops.audit import Audit, Trial
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.descriptor import describe, distances
 from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis, Sighting
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
 from lemtomap.topo.loops.outlook import Outlook
-from lemtomap.topo.loops.places import PlaceBook
+from lemtomap.topo.loops.places import Company, PlaceBook, chain
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.types import GridView
 
@@ -58,6 +59,8 @@ class Closure:
     match: Match
     informs: bool
     """Whether the first node's place in the window was sure, so that the relation tells something new."""
+    evidence: float
+    """How much its sighting counted, 0..1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +83,11 @@ class _Task:
     way_m: float
     """Way over edges from the node the robot was at."""
     hearing_for: Hypothesis | None = None
+    follows: Hypothesis | None = None
+    """The belief that says where the place should be found."""
+    T_grid_followed: Pose | None = None
+    on_trial: tuple[Trial, ...] = ()
+    """Closures that say that the place must be here."""
     search: Search | None = None
 
 
@@ -91,6 +99,7 @@ class LoopCloser:
         self.graph = graph
         self.places = PlaceBook(graph, config.company_m, config.search_points)
         self.hypotheses = Hypotheses(config, lambda node_id: self.places.around(node_id, 20.0, 96))
+        self.audit = Audit(graph, config.audit, config.gate)
         self.searched = 0
         self.work = 0
         self.confirmed: list[Confirmed] = []
@@ -98,6 +107,7 @@ class LoopCloser:
         self._since_outlook = 0
         self._tasks: deque[_Task] = deque()
         self._tried: dict[int, float] = {}
+        self._heard: dict[int, float] = {}
         self.log: Callable[[str], None] | None = None
 
     def place_taken(self, node_id: int) -> None:
@@ -129,17 +139,21 @@ class LoopCloser:
         chosen = self._candidates(situation, points_grid)
         if situation.here_id not in situation.measured and self._has_place(situation.here_id):
             chosen.insert(0, situation.here_id)
+        self._call_witness(situation, points_grid)
         if not chosen and not self.hypotheses.alive:
             return
         reference: Reference | None = None
-        for node_id in dict.fromkeys([*self._followed(situation), *chosen]):
+        followed = self._followed(situation)
+        for node_id in dict.fromkeys([*followed, *chosen]):
             box = self._box(situation, node_id)
             if box is None:
                 continue
             reference = reference or Reference(situation.grid, points_grid, self.config.match)
             self._note_trial(node_id, situation.travelled_m)
             way_m = self._way_m(situation.here_id, node_id)
-            self._tasks.append(_Task(node_id, situation, reference, box, way_m))
+            task = _Task(node_id, situation, reference, box, way_m)
+            task.follows, task.T_grid_followed = followed.get(node_id, (None, None))
+            self._tasks.append(task)
         while len(self._tasks) > 4 * self.config.hearing:
             self._tasks.popleft()
 
@@ -147,11 +161,36 @@ class LoopCloser:
         """Work a slice; return the closures that became certain."""
         if self._outlook is not None:
             self._outlook.advance(self.config.gate.outlook_per_update)
+        self.audit.advance(self.config.gate.outlook_per_update)
         budget = self.config.budget
         while self._tasks and budget > 0:
             budget -= self._work(self._tasks[0], budget)
         hypothesis = self.hypotheses.certain()
         return [] if hypothesis is None else self._commit(hypothesis)
+
+    def _call_witness(self, situation: Situation, points_grid: NDArray[np.float64]) -> None:
+        """Search a place that must be near the robot by closures alone."""
+        audit, here_id = self.config.audit, situation.here_id
+        if here_id not in situation.measured:
+            return
+        reached = self.graph.reach(here_id, audit.way_m, 96)
+        best_id, best_m, witnesses = 0, audit.near_m, []
+        for node_id, T_here_node in chain(reached).items():
+            if node_id in situation.measured or not self._has_place(node_id):
+                continue
+            at = compose(situation.T_grid_here, T_here_node)
+            gap_m = float(np.hypot(*(at[:2] - situation.T_grid_base[:2])))
+            if gap_m < best_m and (crossed := self.audit.crossed(reached, node_id)):
+                best_id, best_m, witnesses, T_grid_best = node_id, gap_m, crossed, at
+        if not best_id or situation.travelled_m - self._heard.get(best_id, -np.inf) < audit.apart_m:
+            return
+        self._heard[best_id] = situation.travelled_m
+        gate = self.config.gate
+        box = SearchBox(T_grid_best, gate.least_box_m, gate.least_box_m, gate.least_box_rad)
+        reference = Reference(situation.grid, points_grid, self.config.match)
+        task = _Task(best_id, situation, reference, box, 0.0)
+        task.on_trial, task.T_grid_followed = tuple(witnesses), T_grid_best
+        self._tasks.append(task)
 
     # -- which places
     # -----------------------------------------------------------------------------------------
@@ -222,20 +261,22 @@ class LoopCloser:
                 break
         return chosen
 
-    def _followed(self, situation: Situation) -> list[int]:
-        """Return, for each hypothesis, the known node that should be nearest to the robot now."""
-        chosen = []
+    def _followed(self, situation: Situation) -> dict[int, tuple[Hypothesis, Pose]]:
+        """Return the known node that should be nearest to the robot by each hypothesis, and where in the
+        window.
+        """
+        chosen: dict[int, tuple[Hypothesis, Pose]] = {}
         for hypothesis in self.hypotheses.alive:
             seen = hypothesis.latest
             base = situation.T_grid_base
-            best, best_m = 0, np.inf
+            best, best_m, T_grid_best = 0, np.inf, base
             for node_id, T_seen_node in self.places.around(seen.node_id, 12.0, 48).items():
                 at = compose(seen.match.T_grid_place, T_seen_node)
                 gap_m = float(np.hypot(at[0] - base[0], at[1] - base[1]))
                 if gap_m < best_m and node_id not in situation.measured and self._has_place(node_id):
-                    best, best_m = node_id, gap_m
+                    best, best_m, T_grid_best = node_id, gap_m, at
             if best and situation.travelled_m - self._tried.get(best, -np.inf) >= 0.5 * self.config.apart_m:
-                chosen.append(best)
+                chosen.setdefault(best, (hypothesis, T_grid_best))
         return chosen
 
     def _robot_in(self, outlook: Outlook, situation: Situation) -> Pose | None:
@@ -260,7 +301,7 @@ class LoopCloser:
             [gate.least_box_m, gate.least_box_m, gate.least_box_rad],
             [gate.widest_m, gate.widest_m, gate.widest_rad],
         )
-        return SearchBox(T_grid_node, float(half[0]), float(half[1]), float(half[2]))
+        return SearchBox(T_grid_node, float(half[0]), float(half[1]), float(half[2]), sigma)
 
     # -- searching
     # --------------------------------------------------------------------------------------------
@@ -268,7 +309,7 @@ class LoopCloser:
     def _work(self, task: _Task, budget: int) -> int:
         """Do a slice of the first task; return the work spent."""
         if task.search is None:
-            company = self.places.company(task.node_id)
+            company = self._company(task)
             if company is None:
                 self._tasks.popleft()
                 return 1
@@ -286,6 +327,10 @@ class LoopCloser:
     def _judge(self, task: _Task) -> None:
         """Make a sighting of what a finished search found, and hear the others when it is a new belief."""
         match = task.search.match if task.search is not None else None
+        if task.on_trial:
+            self._testify(task, match)
+            return
+        hypothesis = None
         if match is not None and self._is_sighting(match, task) and not self._confirms(match, task):
             hypothesis = self.hypotheses.add(self._sighting(task, match))
             if self.log:
@@ -295,8 +340,34 @@ class LoopCloser:
             if len(hypothesis.sightings) == 1:
                 hypothesis.needed = self.config.sightings
                 self._hear(task, hypothesis)
+        if task.follows is not None and hypothesis is not task.follows and self._contradicts(task):
+            task.follows.rejected += 1
         if task.hearing_for is not None and not any(t.hearing_for is task.hearing_for for t in self._tasks):
             task.hearing_for.heard = True
+
+    def _company(self, task: _Task) -> Company | None:
+        """Return what is searched: a place with its neighbours; one on trial alone, who knows whose they
+        are.
+        """
+        return self.places.alone(task.node_id) if task.on_trial else self.places.company(task.node_id)
+
+    def _testify(self, task: _Task, match: Match | None) -> None:
+        """Let a place speak for or against the closures by which it must be here; silent when unsure."""
+        if match is not None and self._is_sighting(match, task):
+            if match.weakest >= self.config.corridor:
+                self.audit.hear(task.on_trial, agrees=True)
+        elif self._contradicts(task):
+            if self.log:
+                self.log(f"witness against {task.situation.here_id}~{task.node_id} {match}")
+            self.audit.hear(task.on_trial, agrees=False)
+
+    def _contradicts(self, task: _Task) -> bool:
+        """Tell whether the window shows something else where a belief says that a place must be."""
+        company = self._company(task)
+        if company is None or task.T_grid_followed is None:
+            return False
+        match = task.reference.refine(company.points_node, task.T_grid_followed)
+        return match.known >= self.config.known and match.contradicted >= self.config.refuted
 
     def _confirms(self, match: Match, task: _Task) -> bool:
         """Take a search for the associated node that found it where it was thought to be."""
@@ -311,7 +382,7 @@ class LoopCloser:
 
     def _is_sighting(self, match: Match, task: _Task) -> bool:
         config = self.config
-        company = self.places.company(task.node_id)
+        company = self._company(task)
         explained = match.explained * match.known * (0 if company is None else len(company.points_node))
         return (
             match.score >= (config.score if self._far_over_edges(task) else config.slip_score)
@@ -331,7 +402,32 @@ class LoopCloser:
             reversed_covariance(here.T_grid_here, here.covariance), match.T_grid_place, match.covariance
         )
         informs = here.here_id in here.measured and here.here_id != task.node_id
-        return Sighting(task.node_id, match, here.here_id, T_here_node, covariance, here.travelled_m, informs)
+        return Sighting(
+            task.node_id,
+            match,
+            here.here_id,
+            T_here_node,
+            covariance,
+            here.travelled_m,
+            informs,
+            self._evidence(task, match),
+        )
+
+    def _evidence(self, task: _Task, match: Match) -> float:
+        """Return how much a sighting counts: half for each reason to think that it may be chance.
+
+        Along a corridor a place is told by a few door frames, and they repeat; the next metre of travel
+        sees the same frames again, so that only more of the way can tell.
+        """
+        config = self.config
+        company = self.places.company(task.node_id)
+        found = 0.0 if company is None else task.reference.found_in(company.points_node, match.T_grid_place)
+        doubts = [
+            match.weakest < config.corridor,
+            task.box.surprise(match.T_grid_place) > config.surprise,
+            found < config.found,
+        ]
+        return float(0.5 ** sum(doubts))
 
     def _hear(self, task: _Task, hypothesis: Hypothesis) -> None:
         """Search every other place within the gate before the belief may become certain."""
@@ -358,15 +454,26 @@ class LoopCloser:
         """Make a certain hypothesis closures, one for each sighting, and start with a fresh outlook."""
         closures = [
             Closure(
-                s.here_id, s.node_id, s.T_here_node, s.covariance, s.match.T_grid_place, s.match, s.informs
+                s.here_id,
+                s.node_id,
+                s.T_here_node,
+                s.covariance,
+                s.match.T_grid_place,
+                s.match,
+                s.informs,
+                s.evidence,
             )
             for s in hypothesis.sightings
         ]
+        self.start_afresh()
+        return closures
+
+    def start_afresh(self) -> None:
+        """Forget beliefs and searches: the graph they rest on has changed."""
         self.hypotheses.alive.clear()
         self._tasks.clear()
         self._since_outlook = self.config.gate.renew_after
         self.places.forget()
-        return closures
 
 
 def reversed_covariance(T_a_b: Pose, covariance: Covariance) -> Covariance:

@@ -25,6 +25,7 @@ class MatchConfig:
     residual_m: float = 0.05  # scale of the robust weight: one window cell
     rounds: int = 12  # Gauss-Newton converges within this from half a search cell
     point_sigma_m: float = 0.03  # of one averaged point across its wall
+    around_m: float = 4.0  # what the window shows so near to a place should be known: places reach 5 m
     correlation: float = 12.0  # neighbouring points err together: information is divided by this
 
     def __post_init__(self) -> None:
@@ -96,12 +97,25 @@ class LocatorConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class AuditConfig:
+    """When a committed closure is taken back."""
+
+    limit_chi2: float = 33.0  # off the way round it: 1 in 3,000,000 by chance (3 degrees); edges are no Gauss
+    tight_m: float = 1.0  # a way round less sure than this confirms nothing
+    least_against: int = 2  # witnesses against, when none speaks for it
+    near_m: float = 4.0  # a place this near is seen whole in the window
+    way_m: float = 15.0  # over edges, closures included: how far places are called as witnesses
+    apart_m: float = 1.0  # travel between two hearings of one place
+
+
+@dataclass(frozen=True, slots=True)
 class LoopConfig:
     """When a place is believed to be one known before."""
 
     match: MatchConfig = field(default_factory=MatchConfig)
     gate: GateConfig = field(default_factory=GateConfig)
     locator: LocatorConfig = field(default_factory=LocatorConfig)
+    audit: AuditConfig = field(default_factory=AuditConfig)
     budget: int = 6_000  # bound evaluations in one update: 4 ms
     candidates: int = 3  # places searched at one event, the most alike and likely first
     hearing: int = 24  # ... and before a closure is committed: all others within the gate, up to this
@@ -118,6 +132,10 @@ class LoopConfig:
     rival: float = 0.8  # ... most a different pose may score, ...
     weakest: float = 0.12  # ... least share of the strongest axis' information on the weakest, ...
     points: int = 60  # ... and least explained: six metres of wall
+    corridor: float = 0.25  # a sighting with less on the weakest axis counts half, ...
+    surprise: float = 2.5  # ... so does one so many sigmas from where the graph expects it, ...
+    found: float = 0.7  # ... and one in which less than this of what the window shows there is known
+    refuted: float = 0.25  # share in free space from which a place is not where a belief says it must be
     sightings: int = 2  # that agree, before a closure is committed
     apart_m: float = 1.5  # travel between sightings that count
     agree_m: float = 0.35  # sightings agree when they put the same node within this ...

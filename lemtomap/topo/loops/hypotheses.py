@@ -33,6 +33,8 @@ class Sighting:
     travelled_m: float
     informs: bool
     """Whether the robot's own node stood surely in the window."""
+    evidence: float = 1.0
+    """How much it counts, 0..1."""
 
 
 @dataclass(slots=True)
@@ -52,13 +54,15 @@ class Hypothesis:
         """The newest sighting."""
         return self.sightings[-1]
 
-    def support(self, config: LoopConfig) -> int:
-        """Return how many sightings count: those at least `apart_m` of travel from the one counted before."""
-        count, counted_m = 0, -np.inf
+    def support(self, config: LoopConfig) -> float:
+        """Return the evidence of the sightings that count, those at least `apart_m` of travel from the one
+        counted before, less the searches that contradicted.
+        """
+        total, counted_m = 0.0, -np.inf
         for sighting in self.sightings:
             if sighting.travelled_m - counted_m >= config.apart_m:
-                count, counted_m = count + 1, sighting.travelled_m
-        return count
+                total, counted_m = total + sighting.evidence, sighting.travelled_m
+        return total - self.rejected
 
 
 class Hypotheses:
@@ -93,7 +97,7 @@ class Hypotheses:
         for hypothesis in self.alive:
             if not hypothesis.heard or hypothesis.support(self.config) < hypothesis.needed:
                 continue
-            if hypothesis.rejected == 0 and not any(
+            if not any(
                 other is not hypothesis and 2 * len(other.sightings) >= len(hypothesis.sightings)
                 for other in self.alive
             ):

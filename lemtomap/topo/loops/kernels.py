@@ -489,3 +489,33 @@ def tally(
         else:
             unknown += 1
     return hit, against, unknown
+
+
+@njit(nogil=True, cache=True)
+def share_near(
+    points_m: Values,
+    targets_m: Values,
+    reach_m: float,
+    cell_m: float,
+) -> float:
+    """Return the share of points that have a target in their cell or one of the two rings around it.
+
+    points_m: float64 (N, 2), targets_m: float64 (M, 2), one frame; targets further than `reach_m` and two
+    cells from the origin (Chebyshev) are not needed. 1 when there are no points.
+    """
+    half = int(np.ceil(reach_m / cell_m)) + 3
+    taken = np.zeros((2 * half + 1, 2 * half + 1), dtype=np.bool_)
+    for i in range(targets_m.shape[0]):
+        c = int(np.floor(targets_m[i, 0] / cell_m)) + half
+        r = int(np.floor(targets_m[i, 1] / cell_m)) + half
+        if 2 <= c < 2 * half - 1 and 2 <= r < 2 * half - 1:
+            taken[r - 2 : r + 3, c - 2 : c + 3] = True
+    if points_m.shape[0] == 0:
+        return 1.0
+    count = 0
+    for i in range(points_m.shape[0]):
+        c = int(np.floor(points_m[i, 0] / cell_m)) + half
+        r = int(np.floor(points_m[i, 1] / cell_m)) + half
+        if 0 <= c < 2 * half + 1 and 0 <= r < 2 * half + 1 and taken[r, c]:
+            count += 1
+    return count / points_m.shape[0]

@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, pose, wrap_angle
+from lemtomap.se2 import Pose, inverse, pose, transform, wrap_angle
 from lemtomap.topo.graph import sure_of
 from lemtomap.topo.loops import kernels
 from lemtomap.topo.loops.config import MatchConfig
@@ -19,6 +19,7 @@ from lemtomap.types import GridView
 
 Points = NDArray[np.float64]
 """float64 (N, 2), metres, in the frame the name says."""
+LEAST_SIGMA = np.array([0.2, 0.2, 0.05])  # no surprise within what a window itself may bend by
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,16 @@ class SearchBox:
     half_x_m: float
     half_y_m: float
     half_yaw_rad: float
+    sigma: NDArray[np.float64] | None = None
+    """float64 (3,): m, m, rad, how surely the middle is known, grid frame; None when nothing is."""
+
+    def surprise(self, T_grid_place: Pose) -> float:
+        """Return how many sigmas a pose is away from the middle, on the axis where it is most."""
+        if self.sigma is None:
+            return 0.0
+        off = np.abs(T_grid_place - self.T_grid_place)
+        off[2] = abs(wrap_angle(off[2]))
+        return float((off / np.maximum(self.sigma, LEAST_SIGMA)).max())
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +106,12 @@ class Reference:
         if self._stack is None:
             self._stack = kernels.pyramid(self.field, self.config.levels)
         return self._stack
+
+    def found_in(self, points_place: Points, T_grid_place: Pose) -> float:
+        """Return the share of the window's hits around a place that lie on the place's points."""
+        near = transform(inverse(T_grid_place), self.points_grid)
+        near = near[np.hypot(near[:, 0], near[:, 1]) <= self.config.around_m]
+        return float(kernels.share_near(near, points_place, self.config.around_m, self.cell_m))
 
     def refine(
         self, points_place: Points, T_grid_place: Pose, *, score: float = 1.0, rival: float = 0.0

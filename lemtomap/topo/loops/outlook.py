@@ -155,6 +155,15 @@ class Outlook:
         T_from_node = between(np.array([a.x_m, a.y_m, a.yaw_rad]), np.array([b.x_m, b.y_m, b.yaw_rad]))
         return Expected(T_from_node, turn @ covariance @ turn.T, a.way_m + b.way_m - 2.0 * common.way_m)
 
+    def way(self, node_id: int) -> list[tuple[int, int]]:
+        """Return the pairs of nodes on the way from a node back to the anchor."""
+        pairs = []
+        while node_id != self.anchor_id:
+            via_id = self._known[node_id].via_id
+            pairs.append((via_id, node_id))
+            node_id = via_id
+        return pairs
+
     def _common(self, a_id: int, b_id: int) -> _Known:
         """Return the last node that the ways to two nodes share."""
         a, b = self._known[a_id], self._known[b_id]

@@ -54,6 +54,11 @@ class PlaceBook:
         """Return what a node's place looks like, float32 (20,); None when it has no localisation data."""
         return kept(self._descriptors, node_id, DESCRIPTORS_KEPT, self._describe)
 
+    def alone(self, node_id: int) -> Company | None:
+        """Return a node's place without its neighbours; None when it has none."""
+        own = self.points(node_id)
+        return None if own is None or len(own) == 0 else Company(node_id, own, self._chosen(own))
+
     def forget(self, *node_ids: int) -> None:
         """Read these nodes afresh (and all companies, which they may belong to)."""
         for node_id in node_ids:
@@ -87,11 +92,13 @@ class PlaceBook:
         cells = np.round(joined / RASTER_M).astype(np.int64)
         _, first = np.unique(cells[:, 0] * ROW + cells[:, 1], return_index=True)
         joined = np.ascontiguousarray(joined[np.sort(first)])
-        stride = max(1.0, len(joined) / self._search_points)
-        chosen = joined[
-            np.unique(np.minimum(np.arange(0, len(joined), stride), len(joined) - 1).astype(np.int64))
-        ]
-        return Company(node_id, joined, np.ascontiguousarray(chosen))
+        return Company(node_id, joined, self._chosen(joined))
+
+    def _chosen(self, points: Points) -> Points:
+        """Return an even choice of points, as many as a search needs."""
+        stride = max(1.0, len(points) / self._search_points)
+        rows = np.minimum(np.arange(0, len(points), stride), len(points) - 1).astype(np.int64)
+        return np.ascontiguousarray(points[np.unique(rows)])
 
 
 def chain(reached: dict[int, Reached]) -> dict[int, Pose]:

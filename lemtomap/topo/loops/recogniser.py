@@ -28,6 +28,8 @@ class LoopRecogniser:
         """(edge ID, closure) of all that were committed."""
         self.locator: Locator | None = None
         """At work while a part of the map is not joined to the robot's."""
+        self.revoked: list[int] = []
+        """Edge IDs of those that were taken back."""
         self._closer: LoopCloser | None = None
         self._index: PlaceIndex | None = None
         self._found: dict[int, Pose] = {}
@@ -107,8 +109,19 @@ class LoopRecogniser:
         covariance = chain_covariance(doubt, located.T_grid_node, located.covariance)
         edge = mapper.close_loop(here_id, located.node_id, T_here_node, covariance)
         T_grid_node, match = located.T_grid_node, located.match
-        closure = Closure(here_id, located.node_id, T_here_node, covariance, T_grid_node, match, informs=True)
+        evidence = float(self.config.locator.checks)
+        closure = Closure(
+            here_id,
+            located.node_id,
+            T_here_node,
+            covariance,
+            T_grid_node,
+            match,
+            informs=True,
+            evidence=evidence,
+        )
         self.closures.append((edge.edge_id, closure))
+        self._of(mapper).audit.commit([edge], support=evidence)
         at = mapper.now[0].T_grid_base
         gap_m = float(np.hypot(located.T_grid_node[0] - at[0], located.T_grid_node[1] - at[1]))
         if gap_m <= mapper.config.new_node_distance_m:
@@ -120,13 +133,19 @@ class LoopRecogniser:
 
     def _close(self, mapper: "TopoMapper") -> None:
         closer = self._of(mapper)
+        for trial in closer.audit.lost():
+            self._revoke(mapper, closer, [edge.edge_id for edge in trial.edges])
         closures = closer.update()
+        edges = []
         for closure in closures:
             if closure.informs:
                 edge = mapper.close_loop(
                     closure.here_id, closure.node_id, closure.T_here_node, closure.covariance
                 )
+                edges.append(edge)
                 self.closures.append((edge.edge_id, closure))
+        if edges:
+            closer.audit.commit(edges, support=sum(closure.evidence for closure in closures))
         for closure in closures:
             self._anchor(mapper, Confirmed(closure.node_id, closure.T_grid_node, closure.match.covariance))
         if closures and not self._stands(mapper, mapper.associated_id):
@@ -136,6 +155,14 @@ class LoopRecogniser:
         for confirmed in closer.confirmed:
             self._anchor(mapper, confirmed)
         closer.confirmed.clear()
+
+    def _revoke(self, mapper: "TopoMapper", closer: LoopCloser, edge_ids: list[int]) -> None:
+        """Take back closures that proved wrong, and what was believed because of them."""
+        mapper.revoke(*edge_ids)
+        self.closures = [(edge_id, closure) for edge_id, closure in self.closures if edge_id not in edge_ids]
+        self.revoked += edge_ids
+        self._found.clear()
+        closer.start_afresh()
 
     def _stands(self, mapper: "TopoMapper", node_id: int) -> bool:
         """Tell whether a node's place in the window is sure."""
