@@ -10,6 +10,7 @@ visits. Rays follow the raster's distance field, so a scan is right to a fractio
 import argparse
 import sys
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -146,9 +147,7 @@ def write_log(world: World, out: Path, seed: int, length_m: float, quality: Odom
     rng = np.random.default_rng(seed)
     truth = poses_along(tour(world, length_m, rng), quality)
     odometry = odometry_of(truth, quality, rng)
-    steps = np.hypot(*np.diff(truth[:, :2], axis=0).T) / SPEED_MPS + np.abs(
-        wrap_angle(np.diff(truth[:, 2]))
-    )
+    steps = np.hypot(*np.diff(truth[:, :2], axis=0).T) / SPEED_MPS + np.abs(wrap_angle(np.diff(truth[:, 2])))
     stamps = 1000.0 + np.concatenate([[0.0], np.cumsum(np.maximum(steps, 0.05))])
     laser = Laser(world.raster)
     with out.open("w", encoding="ascii") as file:
@@ -170,7 +169,7 @@ def _pairs(truth: Pose, rng: np.random.Generator) -> list[tuple[int, int]]:
     """Return pairs of scans: each metre of way with the next, and with other visits to the same place."""
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
     keys = np.searchsorted(way, np.arange(0.0, way[-1], 1.0))
-    pairs = [(int(a), int(b)) for a, b in zip(keys[:-1], keys[1:], strict=True) if b > a]
+    pairs = [(int(a), int(b)) for a, b in pairwise(keys.tolist()) if b > a]
     for key in keys:
         gap = np.hypot(*(truth[keys, :2] - truth[key, :2]).T)
         others = keys[(gap < NEAR_M) & (way[keys] - way[key] > APART_M)]

@@ -144,13 +144,13 @@ def chain_covariance(first: Covariance, T_b_c: Pose, second: Covariance) -> Cova
 WEAK_AXIS = 0.1  # a direction with less of the strongest one's information tells nothing (thesis, appendix D)
 
 
-def sure_of(information: Covariance) -> Covariance:
+def sure_of(information: Covariance, *, weak_axis: float = WEAK_AXIS) -> Covariance:
     """Return the covariance of a match from its information, a metre along what it does not really see.
 
     Walls are never quite straight, so a corridor seems to say a little about the way along it. It does not.
     """
     low, high = np.linalg.eigh(information[:2, :2])[0]
-    if low < WEAK_AXIS * high:
+    if low < weak_axis * high:
         along = np.zeros(3)
         along[:2] = np.linalg.eigh(information[:2, :2])[1][:, 0]
         keep = np.eye(3) - np.outer(along, along)

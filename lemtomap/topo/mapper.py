@@ -129,7 +129,7 @@ class TopoMapper:
             self._recogniser.update(self)
         standing = self.local.standings[self._associated_id]
         seen = standing.seen if standing.anchored else None
-        self.trail.append(slam, self._associated_id, self.T_node_base, seen)
+        self.trail.append(slam, self._associated_id, self.T_node_base, seen, points_base)
         self.store.tick(slam.stamp_s)
 
     # -- the steps of Figure 3-6 ----------------------------------------------------------------------------

@@ -1,8 +1,11 @@
 """Where each scan was taken, streamed to disk: memory stays flat however long the drive."""
 
+import math
+import struct
 import tempfile
 import weakref
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Self
 
@@ -27,6 +30,46 @@ RECORD = np.dtype(
     ]
 )
 _BUFFERED = 256
+LOOK_M, LOOK_RAD = 0.25, 0.35  # motion between two scans whose hits are kept as well
+HIT_STEP_M = 0.001
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The hits of one scan of the drive."""
+
+    scan: int
+    """Its number in the trail."""
+    hits_base: NDArray[np.float32]
+    """float32 (N, 2), metres, base frame."""
+
+
+class _LookFile:
+    """Every so often a scan's hits, a kilobyte or less each: scan, count, then x and y in millimetres."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by the finaliser below
+        weakref.finalize(self, self._file.close)
+        self._last: Pose | None = None
+
+    def offer(self, scan: int, T_grid_base: Pose, hits_base: NDArray[np.floating]) -> None:
+        """Keep a scan's hits if the robot has moved enough since the last that were kept."""
+        if self._last is not None:
+            x, y, turn = (T_grid_base - self._last).tolist()
+            if math.hypot(x, y) < LOOK_M and math.cos(turn) > math.cos(LOOK_RAD):
+                return
+        self._last = np.array(T_grid_base)
+        limit = np.iinfo(np.int16).max
+        hits = np.clip(np.rint(hits_base / HIT_STEP_M), -limit, limit).astype("<i2")
+        self._file.write(struct.pack("<qi", scan, len(hits)) + hits.tobytes())
+
+    def looks(self) -> Iterator[Look]:
+        self._file.seek(0)
+        while head := self._file.read(12):
+            scan, count = struct.unpack("<qi", head)
+            hits = np.frombuffer(self._file.read(4 * count), "<i2").reshape(-1, 2)
+            yield Look(scan, hits.astype(np.float32) * np.float32(HIT_STEP_M))
+        self._file.seek(0, 2)
 
 
 class ScanTrail:
@@ -38,6 +81,7 @@ class ScanTrail:
         self._buffer = np.zeros(_BUFFERED, RECORD)
         self._filled = 0
         self.count = 0
+        self._looks = _LookFile()
 
     @classmethod
     def temporary(cls) -> Self:
@@ -50,9 +94,18 @@ class ScanTrail:
         return cls(path.open("w+b"))
 
     def append(
-        self, slam: SlamUpdate, node_id: int, T_node_base: Pose, tie: NDArray[np.float64] | None
+        self,
+        slam: SlamUpdate,
+        node_id: int,
+        T_node_base: Pose,
+        tie: NDArray[np.float64] | None,
+        hits_base: NDArray[np.floating] | None = None,
     ) -> None:
-        """Add one scan; tie: covariance of the node's pose in the window, None while it is only predicted."""
+        """Add one scan; tie: covariance of the node's pose in the window, None while it is only predicted;
+        hits_base: float (N, 2), metres, base frame, of which some scans' are kept.
+        """
+        if hits_base is not None and len(hits_base) and slam.matched:
+            self._looks.offer(self.count, slam.T_grid_base, hits_base)
         record = self._buffer[self._filled]
         record["stamp_s"], record["node_id"], record["T_node_base"] = slam.stamp_s, node_id, T_node_base
         record["T_grid_base"], record["step"] = slam.T_grid_base, slam.step_covariance
@@ -71,6 +124,10 @@ class ScanTrail:
             data = self._file.read(at_once * RECORD.itemsize)
             yield np.frombuffer(data, RECORD)
             position += at_once
+
+    def looks(self) -> Iterator[Look]:
+        """Iterate over the scans whose hits were kept, in the order of the drive."""
+        return self._looks.looks()
 
     def close(self) -> None:
         """Write what is left and close."""

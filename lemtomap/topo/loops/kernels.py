@@ -518,4 +518,4 @@ def share_near(
         r = int(np.floor(points_m[i, 1] / cell_m)) + half
         if 0 <= c < 2 * half + 1 and 0 <= r < 2 * half + 1 and taken[r, c]:
             count += 1
-    return count / points_m.shape[0]
+    return float(count / points_m.shape[0])

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, compose, transform
-from lemtomap.topo.loops.descriptor import BYTES, ROW, unpack
+from lemtomap.topo.loops.cells import thinned
+from lemtomap.topo.loops.descriptor import BYTES, unpack
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.place import decode_place
 
@@ -89,9 +90,7 @@ class PlaceBook:
                 parts.append(transform(T_node_other, points))
         joined = np.concatenate(parts)
         joined = joined[np.hypot(joined[:, 0], joined[:, 1]) <= self._company_m]
-        cells = np.round(joined / RASTER_M).astype(np.int64)
-        _, first = np.unique(cells[:, 0] * ROW + cells[:, 1], return_index=True)
-        joined = np.ascontiguousarray(joined[np.sort(first)])
+        joined = thinned(joined, RASTER_M)
         return Company(node_id, joined, self._chosen(joined))
 
     def _chosen(self, points: Points) -> Points:
