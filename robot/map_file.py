@@ -14,7 +14,7 @@ Edit = Callable[[TopoStore, Sequence[str]], str]
 
 def info(path: Path) -> str:
     """Return what a map holds, a line each. Raises BadMap."""
-    with TopoStore.open(path) as store:
+    with TopoStore.view(path) as store:
         held = describe_map(store)
     return "\n".join(f"{name:<13} {value}" for name, value in _facts(held))
 
@@ -121,7 +121,7 @@ def export_map(path: Path, target: Path) -> str:
     writer = EXPORTS.get(target.suffix.lower())
     if writer is None:
         raise BadSetting(f"{target}: unknown kind; known are {', '.join(EXPORTS)}")
-    with TopoStore.open(path) as store:
+    with TopoStore.view(path) as store:
         writer(store, target)
     return f"{target} written; {NOTES[target.suffix.lower()]}"
 

@@ -9,7 +9,7 @@ from lemtomap.errors import BadInput
 from lemtomap.topo.graph import Edge, Node
 from lemtomap.topo.journal import recorded, undo
 from lemtomap.topo.paging import PagedGraph
-from lemtomap.topo.store import TopoStore
+from lemtomap.topo.store import FOR_EVER_S, TopoStore
 
 __all__ = [
     "block_edge",
@@ -22,9 +22,6 @@ __all__ = [
     "undo",
     "unname",
 ]
-
-FOR_EVER_S = 1e18
-"""blocked_until_s of an edge closed by hand."""
 
 
 def resolve_node(store: TopoStore, text: str) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 
 from lemtomap.topo import schema
 from lemtomap.topo.graph import USUAL_SPEED_MPS, Mark, Placeholder, detour
-from lemtomap.topo.rows import placeholder_from, planar_length_m, type_code
+from lemtomap.topo.rows import MEASURE, placeholder_from, planar_length_m, type_code
 from lemtomap.types import EdgeTable, EdgeType, RouteEdge
 
 _NEIGHBOURS = (
@@ -19,6 +19,9 @@ _NEIGHBOURS = (
 _ALL_EDGES = "SELECT id, source, target, time, blocked, measure, type FROM edge"
 _EDGES_AT = _ALL_EDGES + " WHERE source = ?1 OR target = ?1"
 _DETOURS = np.array([detour(kind) for kind in sorted(EdgeType, key=type_code)])  # by the file's type code
+_MEASURE = np.dtype(
+    {"names": ["x", "y"], "formats": ["<f8", "<f8"], "offsets": [0, 8], "itemsize": MEASURE.size}
+)
 CACHED_NODES = (
     200_000  # some 500 bytes each: at most about 100 MB, reached only by planning across such a map
 )
@@ -142,9 +145,8 @@ class TopoReader:
 
 def _table(rows: Sequence[tuple[Any, ...]]) -> EdgeTable:
     edge_id, source, target, time, blocked, measure, code = zip(*rows, strict=True) if rows else ((),) * 7
-    step = len(measure[0]) // 8 if measure else 2
-    values = np.frombuffer(b"".join(measure), dtype="<f8").reshape(-1, step)
-    length_m = np.hypot(values[:, 0], values[:, 1])
+    values = np.frombuffer(b"".join(measure), dtype=_MEASURE)
+    length_m = np.hypot(values["x"], values["y"])
     learnt_s = np.array(time, dtype=np.float64)  # None becomes NaN
     straight_s = length_m / USUAL_SPEED_MPS * _DETOURS[np.array(code, dtype=np.intp)]
     return EdgeTable(

@@ -1,5 +1,6 @@
 """Rows of the map file ⇄ nodes and edges."""
 
+import math
 import struct
 from collections.abc import Sequence
 from typing import Any
@@ -12,8 +13,11 @@ from lemtomap.types import EdgeType
 NODE_COLUMNS = "id, area, level, created, visits, doubts"
 EDGE_COLUMNS = "id, source, target, type, share, time, blocked, measure"
 
-_MEASURE = struct.Struct("<3d6f")  # relative pose in full; covariance's upper triangle needs no more
-_UPPER = np.triu_indices(3)
+MEASURE = struct.Struct("<3d3e3h")
+"""Relative pose in full; of the covariance standard deviations to a thousandth, and correlations."""
+_CORRELATION_STEPS = 32767
+_SHRINK = 1.0 - 2e-4  # of correlations: rounded, the covariance must stay positive definite
+_LEAST_SIGMA, _MOST_SIGMA = 1e-4, 6e4  # of half precision
 _TYPES = (EdgeType.ODOMETRY, EdgeType.NEAR_NEIGHBOUR, EdgeType.LOOP_CLOSING)
 _CODES = {kind: code for code, kind in enumerate(_TYPES)}
 _SHARE_STEPS = 255
@@ -31,7 +35,7 @@ def node_from(row: Sequence[Any]) -> Node:
 
 def edge_row(edge: Edge) -> tuple[Any, ...]:
     """Return the edge's values in the order of EDGE_COLUMNS."""
-    measure = _MEASURE.pack(*edge.T_source_target, *edge.covariance[_UPPER])
+    measure = MEASURE.pack(*edge.T_source_target, *_spread(edge.covariance))
     return (
         edge.edge_id,
         edge.source_id,
@@ -47,13 +51,13 @@ def edge_row(edge: Edge) -> tuple[Any, ...]:
 def edge_from(row: Sequence[Any]) -> Edge:
     """Return the edge of a row in the order of EDGE_COLUMNS."""
     edge_id, source, target, code, share, time_s, blocked_s, measure = row
-    values = _MEASURE.unpack(measure)
+    values = MEASURE.unpack(measure)
     return Edge(
         edge_id,
         source,
         target,
         np.array(values[:3]),
-        _symmetric(values[3:]),
+        _covariance(values[3:6], values[6:]),
         _TYPES[code],
         share / _SHARE_STEPS,
         time_s,
@@ -78,6 +82,17 @@ def type_code(kind: EdgeType) -> int:
     return _CODES[kind]
 
 
-def _symmetric(upper: Sequence[float]) -> Covariance:
-    a, b, c, d, e, f = upper
-    return np.array([[a, b, c], [b, d, e], [c, e, f]])
+def _spread(covariance: Covariance) -> tuple[float, ...]:
+    """Return three standard deviations and three correlations in steps."""
+    xx, yy, tt = (math.sqrt(covariance[k, k]) for k in range(3))
+    pairs = ((0, 1, xx * yy), (0, 2, xx * tt), (1, 2, yy * tt))
+    steps = [round(_SHRINK * float(covariance[i, j]) / scale * _CORRELATION_STEPS) for i, j, scale in pairs]
+    return (*(min(max(sigma, _LEAST_SIGMA), _MOST_SIGMA) for sigma in (xx, yy, tt)), *steps)
+
+
+def _covariance(sigmas: Sequence[float], steps: Sequence[int]) -> Covariance:
+    x, y, t = sigmas
+    xy, xt, yt = (step / _CORRELATION_STEPS for step in steps)
+    return np.array(
+        [[x * x, xy * x * y, xt * x * t], [xy * x * y, y * y, yt * y * t], [xt * x * t, yt * y * t, t * t]]
+    )

@@ -1,8 +1,12 @@
 """What a `.lemto` file is: one SQLite file with our application id, and the checks before it is trusted.
 
-The checks read only the file's first 100 bytes, so a file that is not ours is never touched.
+At rest a small map is only its rows: tables without rows and all indexes are left out of the file, where each
+would take a page, and made again when the map is opened for writing. The checks read only the file's header,
+so a file that is not ours is never touched.
 """
 
+import contextlib
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,27 +16,51 @@ from urllib.parse import quote
 from lemtomap.errors import BadMap
 
 APPLICATION_ID = 0x4C454D54  # "LEMT"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 PAGE_SIZE = 1024  # a small map stays small: every table and index takes at least one page
 QUICK_CHECK_LIMIT_BYTES = 32 << 20  # below this the whole tree is checked on opening (some 1 ms a megabyte)
-HEADER_BYTES = 100
+LEAST_BYTES = 512  # of an SQLite file: its smallest page
 _MAGIC = b"SQLite format 3\0"
 
-SCHEMA = """
-CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
-CREATE TABLE node(id INTEGER PRIMARY KEY, area INT, level INT, created REAL, visits INT, doubts INT);
-CREATE TABLE place(node INTEGER PRIMARY KEY, taken REAL, boundary BLOB, descriptor BLOB);
-CREATE TABLE edge(id INTEGER PRIMARY KEY, source INT, target INT, type INT, share INT,
-                  time REAL, blocked REAL, measure BLOB);
-CREATE INDEX edge_source ON edge(source);
-CREATE INDEX edge_target ON edge(target);
-CREATE TABLE name(name TEXT PRIMARY KEY, node INT) WITHOUT ROWID;
-CREATE TABLE area(id INTEGER PRIMARY KEY, name TEXT, kind TEXT, tags TEXT);
-CREATE TABLE placeholder(id INTEGER PRIMARY KEY, node INT, x REAL, y REAL, yaw REAL, width REAL, state TEXT);
-CREATE TABLE mark(id INTEGER PRIMARY KEY, node INT, kind TEXT, x REAL, y REAL, stamp REAL);
-CREATE TABLE change(version INTEGER PRIMARY KEY, node INT);
-CREATE TABLE journal(id INTEGER PRIMARY KEY, stamp REAL, what TEXT, before TEXT);
-"""
+TABLES = {
+    "node": "(id INTEGER PRIMARY KEY, area INT, level INT, created REAL, visits INT, doubts INT)",
+    "place": "(node INTEGER PRIMARY KEY, taken REAL, boundary BLOB, descriptor BLOB)",
+    "edge": "(id INTEGER PRIMARY KEY, source INT, target INT, type INT, share INT, "
+    "time REAL, blocked REAL, measure BLOB)",
+    "meta": "(key TEXT PRIMARY KEY, value) WITHOUT ROWID",
+    "name": "(name TEXT PRIMARY KEY, node INT) WITHOUT ROWID",
+    "area": "(id INTEGER PRIMARY KEY, name TEXT, kind TEXT, tags TEXT)",
+    "placeholder": "(id INTEGER PRIMARY KEY, node INT, x REAL, y REAL, yaw REAL, width REAL, state TEXT)",
+    "mark": "(id INTEGER PRIMARY KEY, node INT, kind TEXT, x REAL, y REAL, stamp REAL)",
+    "change": "(version INTEGER PRIMARY KEY, node INT)",
+    "journal": "(id INTEGER PRIMARY KEY, stamp REAL, what TEXT, before TEXT)",
+}
+ALWAYS = ("node", "place", "edge")
+INDEXES = {
+    "edge_source": "edge(source)",
+    "edge_target": "edge(target)",
+    "edge_blocked": "edge(id) WHERE blocked IS NOT NULL",
+}
+
+
+def complete(connection: sqlite3.Connection) -> None:
+    """Make what the file at rest leaves out; inside a transaction of the caller's."""
+    for name, columns in TABLES.items():
+        connection.execute(f"CREATE TABLE IF NOT EXISTS {name}{columns}")
+    for name, what in INDEXES.items():
+        connection.execute(f"CREATE INDEX IF NOT EXISTS {name} ON {what}")
+
+
+def strip(connection: sqlite3.Connection) -> None:
+    """Leave out empty tables and all indexes, and give their pages back."""
+    connection.execute("BEGIN")
+    for name in INDEXES:
+        connection.execute(f"DROP INDEX {name}")
+    for name in TABLES:
+        if name not in ALWAYS and not connection.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():  # noqa: S608
+            connection.execute(f"DROP TABLE {name}")
+    connection.execute("COMMIT")
+    connection.execute("VACUUM")
 
 
 @contextmanager
@@ -58,31 +86,42 @@ def _reason(error: sqlite3.Error) -> str:
 
 
 def check_file(path: Path) -> None:
-    """Raise BadMap unless the file's header says it is a map of a schema we read. Never writes."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(HEADER_BYTES)
-    except IsADirectoryError:
-        raise BadMap(f"{path}: is a folder, not a map file") from None
-    except FileNotFoundError:
-        raise BadMap(f"{path}: no such map file") from None
-    except OSError as error:
-        raise BadMap(f"{path}: {error.strerror}") from None
-    if not head:
-        raise BadMap(f"{path}: empty file, not a .lemto map")
-    if head[:16] != _MAGIC[: len(head)]:
-        raise BadMap(f"{path}: not a .lemto map file")
-    if len(head) < HEADER_BYTES:
-        raise BadMap(f"{path}: truncated after {len(head)} bytes")
-    if int.from_bytes(head[68:72], "big") != APPLICATION_ID:
+    """Raise BadMap unless the file's header says it is a map of a schema we read. Never writes.
+
+    SQLite reads the header: closing a file by other means would drop the locks that this process holds on it.
+    """
+    if path.is_dir():
+        raise BadMap(f"{path}: is a folder, not a map file")
+    if not path.exists():
+        raise BadMap(f"{path}: no such map file")
+    if not os.access(path, os.R_OK):
+        raise BadMap(f"{path}: may not be read by you")
+    if path.stat().st_size < LEAST_BYTES:
+        _refuse_stump(path)
+    with guarded(path), contextlib.closing(_connect(path, "mode=ro&immutable=1")) as connection:
+        try:
+            ((application_id,),) = connection.execute("PRAGMA application_id")
+            ((version,),) = connection.execute("PRAGMA user_version")
+        except sqlite3.DatabaseError:
+            raise BadMap(f"{path}: not a .lemto map file") from None
+    if application_id != APPLICATION_ID:
         raise BadMap(f"{path}: an SQLite file, but not a .lemto map")
-    version = int.from_bytes(head[60:64], "big")
     if version > SCHEMA_VERSION:
         raise BadMap(
             f"{path}: schema {version} is newer than this program's {SCHEMA_VERSION}; update LEMTOMap"
         )
-    if version < 1:
-        raise BadMap(f"{path}: unknown schema {version}")
+    if version < SCHEMA_VERSION:
+        raise BadMap(f"{path}: schema {version} is older than {SCHEMA_VERSION}, which this program reads")
+
+
+def _refuse_stump(path: Path) -> None:
+    """Say what is wrong with a file too short for a map; no one can have it open as one."""
+    data = path.read_bytes()
+    if not data:
+        raise BadMap(f"{path}: empty file, not a .lemto map")
+    if data[:16] != _MAGIC[: len(data)]:
+        raise BadMap(f"{path}: not a .lemto map file")
+    raise BadMap(f"{path}: truncated after {len(data)} bytes")
 
 
 def check_content(path: Path, connection: sqlite3.Connection) -> None:
@@ -99,30 +138,57 @@ def check_content(path: Path, connection: sqlite3.Connection) -> None:
             (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
             if verdict != "ok":
                 raise BadMap(f"{path}: damaged map file ({str(verdict).splitlines()[-1]})")
-        connection.execute("SELECT count(*) FROM meta").fetchone()
+        connection.execute("SELECT count(*) FROM node").fetchone()
 
 
-def connect(path: Path, *, readonly: bool = False) -> sqlite3.Connection:
+def connect(path: Path) -> sqlite3.Connection:
     """Open a connection whose transactions are begun and ended by hand."""
-    mode = "ro" if readonly else "rw"
-    uri = f"file:{quote(str(path.absolute()))}?mode={mode}"
     with guarded(path):
-        connection = sqlite3.connect(
-            uri, uri=True, isolation_level=None, check_same_thread=False, timeout=5.0, cached_statements=64
-        )
-        connection.execute("PRAGMA cache_size = -2048")
-    return connection
+        return _connect(path, "mode=rw")
+
+
+def claim(path: Path, connection: sqlite3.Connection) -> None:
+    """Make sure that no other program has this map open. Raises BadMap.
+
+    The file leaves WAL mode, which SQLite allows only to the last connection; from there it is changed whole.
+    """
+    try:
+        ((mode,),) = connection.execute("PRAGMA journal_mode = DELETE")
+    except sqlite3.OperationalError as error:
+        if "locked" not in str(error):
+            raise
+        mode = "wal"
+    if mode != "delete":
+        raise BadMap(f"{path}: in use by another program (a robot that maps into it?); end that first")
 
 
 def connect_readonly(path: Path) -> sqlite3.Connection:
-    """Open for reading, from read-only media too (where SQLite cannot make its side files)."""
-    connection = connect(path, readonly=True)
-    try:
-        connection.execute("SELECT count(*) FROM meta").fetchone()
-    except sqlite3.Error:
-        connection.close()
-        uri = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"
-        with guarded(path):
-            connection = sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False)
-            connection.execute("SELECT count(*) FROM meta").fetchone()
+    """Open for reading, from read-only media too (where SQLite cannot make its side files).
+
+    What a file at rest leaves out reads as empty.
+    """
+    with guarded(path):
+        connection = _connect(path, "mode=ro")
+        try:
+            held = _tables(connection)
+        except sqlite3.Error:
+            connection.close()
+            connection = _connect(path, "mode=ro&immutable=1")
+            held = _tables(connection)
+        connection.execute("PRAGMA temp_store = MEMORY")
+        for name in TABLES.keys() - held:
+            connection.execute(f"CREATE TEMP TABLE {name}{TABLES[name]}")
+    return connection
+
+
+def _tables(connection: sqlite3.Connection) -> set[str]:
+    return {name for (name,) in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+
+
+def _connect(path: Path, how: str) -> sqlite3.Connection:
+    uri = f"file:{quote(str(path.absolute()))}?{how}"
+    connection = sqlite3.connect(
+        uri, uri=True, isolation_level=None, check_same_thread=False, timeout=5.0, cached_statements=64
+    )
+    connection.execute("PRAGMA cache_size = -2048")
     return connection

@@ -1,8 +1,8 @@
 """The map file as the mapper writes it: a little at a time, safe at every moment.
 
 Writes go into one open transaction that `tick` commits at least every half second of the data's own time,
-so a power cut loses at most that; SQLite's write-ahead log keeps the file whole. One TopoStore writes; any
-number of TopoReader read the same file meanwhile.
+so a power cut loses at most that; SQLite's write-ahead log keeps the file whole. One TopoStore writes, a
+second is refused; any number of TopoReader read the same file meanwhile.
 """
 
 import contextlib
@@ -26,19 +26,29 @@ from lemtomap.topo.rows import (
 )
 
 COMPACT_BELOW_BYTES = 8 << 20  # rewriting a map of this size on closing takes some 50 ms
+FOR_EVER_S = 1e18
+"""blocked_until_s of an edge closed by hand."""
 KEPT_CHANGES = 8192  # a reader further behind than this reads afresh
 
 
 class TopoStore:
     """One `.lemto` file, open for writing."""
 
-    def __init__(self, path: Path, connection: sqlite3.Connection, *, commit_every_s: float = 0.5) -> None:
+    def __init__(
+        self,
+        path: Path,
+        connection: sqlite3.Connection,
+        *,
+        commit_every_s: float = 0.5,
+        readonly: bool = False,
+    ) -> None:
         self.path = path
         self.commit_every_s = commit_every_s
         self._db = connection
+        self._readonly = readonly
         self._closed = False
         self._begun_s: float | None = None
-        self._stamp_s = 0.0
+        self._stamp_s: float | None = None
         self._next_node = self._next_id("node")
         self._next_edge = self._next_id("edge")
         self.version = int(self._one("SELECT coalesce(max(version), 0) FROM change"))
@@ -59,21 +69,37 @@ class TopoStore:
                 connection.execute(f"PRAGMA page_size = {schema.PAGE_SIZE}")
                 connection.execute(f"PRAGMA application_id = {schema.APPLICATION_ID}")
                 connection.execute(f"PRAGMA user_version = {schema.SCHEMA_VERSION}")
-                connection.executescript(f"BEGIN;{schema.SCHEMA}COMMIT;")
+            return cls._prepared(path, connection, durable=durable, commit_every_s=commit_every_s)
         except BadMap:
             path.unlink(missing_ok=True)
             raise
-        return cls._prepared(path, connection, durable=durable, commit_every_s=commit_every_s)
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True, commit_every_s: float = 0.5) -> Self:
-        """Open a map to go on with it. Raises BadMap for anything that is not a whole map of our schema."""
+        """Open a map to go on with it. Raises BadMap for anything that is not a whole map of our schema, and
+        for one that another program has open.
+        """
         path = Path(path)
         schema.check_file(path)
         connection = schema.connect(path)
         try:
             schema.check_content(path, connection)
+            with schema.guarded(path):
+                schema.claim(path, connection)
             return cls._prepared(path, connection, durable=durable, commit_every_s=commit_every_s)
+        except BadMap:
+            connection.close()
+            raise
+
+    @classmethod
+    def view(cls, path: Path | str) -> Self:
+        """Open a map to look into it, also while another program maps and on media that cannot be written."""
+        path = Path(path)
+        schema.check_file(path)
+        connection = schema.connect_readonly(path)
+        try:
+            schema.check_content(path, connection)
+            return cls(path, connection, readonly=True)
         except BadMap:
             connection.close()
             raise
@@ -85,12 +111,17 @@ class TopoStore:
         with schema.guarded(path):
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute(f"PRAGMA synchronous = {'FULL' if durable else 'NORMAL'}")
+            connection.execute("BEGIN IMMEDIATE")
+            schema.complete(connection)
+            connection.execute("COMMIT")
             return cls(path, connection, commit_every_s=commit_every_s)
 
     # -- transactions ---------------------------------------------------------------------------------------
 
     def tick(self, now_s: float) -> None:
         """Tell the data's time; commits what has waited `commit_every_s`."""
+        if self._stamp_s is None:
+            self._carry_blocks_over(now_s)
         self._stamp_s = now_s
         if self._begun_s is None or not self._db.in_transaction:
             return
@@ -101,13 +132,32 @@ class TopoStore:
         """Make everything so far safe."""
         if self._db.in_transaction:
             with schema.guarded(self.path):
+                if self._stamp_s is not None and self._blocked():
+                    self.set_meta("stamp_s", self._stamp_s)
                 self._db.execute("COMMIT")
+
+    def _blocked(self) -> list[tuple[int, float]]:
+        """Return edges that are closed for a while, and until when."""
+        sql = "SELECT id, blocked FROM edge WHERE blocked IS NOT NULL AND blocked < ?"
+        return list(self.query(sql, (FOR_EVER_S,)))
+
+    def _carry_blocks_over(self, now_s: float) -> None:
+        """Count what is left of a block on from now: the clock may have begun anew since it was written."""
+        left_s = self.meta("stamp_s")
+        for edge_id, blocked_s in self._blocked() if left_s is not None else []:
+            edge = self.edge(edge_id)
+            if edge is not None:
+                until_s = now_s + blocked_s - left_s if blocked_s > left_s else 0.0
+                self.put_edge(replace(edge, blocked_until_s=until_s))
 
     def close(self) -> None:
         """Commit, fold the write-ahead log into the one file, close. May be called again."""
         if self._closed:
             return
         self._closed = True
+        if self._readonly:
+            self._db.close()
+            return
         try:
             self._write("DELETE FROM change WHERE version < ?", (self.version,))
             self.commit()
@@ -119,7 +169,7 @@ class TopoStore:
                 self._db.execute("PRAGMA busy_timeout = 0")
                 self._db.execute("PRAGMA journal_mode = DELETE")
                 if self.path.stat().st_size < COMPACT_BELOW_BYTES:
-                    self._db.execute("VACUUM")
+                    schema.strip(self._db)
         finally:
             self._db.close()
 
@@ -137,7 +187,7 @@ class TopoStore:
         with schema.guarded(self.path):
             if not self._db.in_transaction:
                 self._db.execute("BEGIN IMMEDIATE")
-                self._begun_s = self._stamp_s
+                self._begun_s = self._stamp_s or 0.0
             self._db.execute(sql, values)
 
     def query(self, sql: str, values: Iterable[Any] = ()) -> Iterator[tuple[Any, ...]]:

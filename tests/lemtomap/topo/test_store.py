@@ -9,13 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from lemtomap.errors import BadMap
 from lemtomap.nav.config import RouteConfig
 from lemtomap.nav.route.network import RouteNetwork
 from lemtomap.topo.graph import Edge, Place
 from lemtomap.topo.reader import TopoReader
-from lemtomap.topo.store import TopoStore
+from lemtomap.topo.rows import edge_from, edge_row
+from lemtomap.topo.store import FOR_EVER_S, TopoStore
 from lemtomap.types import EdgeType
 
 
@@ -37,10 +40,99 @@ def test_what_is_written_is_read_again_and_the_file_is_one(tmp_path):
         assert store.node(a.node_id) == a
         again = store.edge(edge.edge_id)
         np.testing.assert_array_equal(again.T_source_target, edge.T_source_target)
-        np.testing.assert_allclose(again.covariance, edge.covariance, rtol=1e-6)
+        np.testing.assert_allclose(again.covariance, edge.covariance, rtol=2e-3)
         assert (again.time_s, round(again.share, 2), again.type) == (4.5, 0.4, EdgeType.ODOMETRY)
         assert store.place(a.node_id) == Place(7.0, b"boundary", b"descriptor")
         assert store.names() == {"kitchen": b.node_id}
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(-3.0, 1.0), min_size=3, max_size=3), st.floats(0.05, 1.0), st.floats(-20.0, 20.0))
+def test_a_covariance_comes_back_to_a_thousandth_and_positive_definite(logs, thin, lever_m):
+    sigma = np.diag(10.0 ** np.array(logs))
+    lever = np.eye(3)
+    lever[0, 2] = lever_m  # of a chain of edges: position and heading go together
+    covariance = lever @ sigma @ np.diag([1.0, thin, 1.0]) @ sigma @ lever.T
+    again = edge_from(edge_row(an_edge(1, 2, covariance=covariance))).covariance
+    assert np.linalg.eigvalsh(again)[0] > 0.0
+    scale = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(again / np.outer(scale, scale), covariance / np.outer(scale, scale), atol=2e-3)
+
+
+def test_a_closed_map_holds_only_its_rows_and_is_whole_again_when_opened(tmp_path):
+    path = tmp_path / "a.lemto"
+    with TopoStore.create(path) as store:
+        for k in range(40):
+            store.put_place(store.add_node(created_s=float(k)).node_id, Place(0.0, bytes(200), bytes(20)))
+            store.add_edge(an_edge(k, k + 1))
+    assert path.stat().st_size <= 40 * 500
+    with TopoReader(path) as reader:
+        assert [edge.other_id for edge in reader.edges_of(7)] == [8, 6]
+        assert reader.openings() == []
+    with TopoStore.view(path) as store:
+        assert store.names() == {}
+    with TopoStore.open(path) as store:
+        plan = str(list(store.query("EXPLAIN QUERY PLAN SELECT id FROM edge WHERE source = 3")))
+        assert "edge_source" in plan
+        store.set_name("kitchen", 3)
+    with TopoStore.open(path) as store:
+        assert store.names() == {"kitchen": 3}
+
+
+RIVAL = """
+import sys
+from pathlib import Path
+from lemtomap.errors import BadMap
+from robot.map_file import apply_edit, info
+path = Path(sys.argv[1])
+print(info(path).splitlines()[0])
+try:
+    print(apply_edit(path, ["name", "1", "kitchen"]))
+except BadMap as error:
+    print(error)
+"""
+
+
+def test_while_a_robot_maps_others_may_look_but_not_edit(tmp_path):
+    path = tmp_path / "a.lemto"
+
+    def rival():
+        command = [sys.executable, "-c", RIVAL, str(path)]
+        root = Path(__file__).parents[3]
+        return subprocess.run(command, capture_output=True, text=True, cwd=root, check=True).stdout  # noqa: S603
+
+    with TopoStore.create(path) as store:
+        store.add_node()
+        store.commit()
+        TopoReader(path).close()  # must not let go of the locks that the store holds
+        store.add_node()
+        store.commit()
+        looked, refused = rival().splitlines()
+        assert looked.split() == ["nodes", "2"]
+        assert refused.startswith(f"{path}: in use by another program")
+        store.add_node()
+    assert "is now 'kitchen'" in rival()
+    with TopoStore.open(path) as store:
+        assert store.count("node") == 3
+
+
+def test_what_is_left_of_a_block_outlasts_a_restart_of_the_clock(tmp_path):
+    path = tmp_path / "a.lemto"
+    with TopoStore.create(path) as store:
+        for k in range(3):
+            store.add_node()
+            store.add_edge(an_edge(k, k + 1))
+        store.tick(5000.0)
+        for edge_id, until_s in ((1, 5060.0), (2, 5010.0), (3, FOR_EVER_S)):
+            store.put_edge(replace(store.edge(edge_id), blocked_until_s=until_s))
+        store.tick(5020.0)
+    with TopoStore.open(path) as store:
+        store.tick(7.0)
+        assert [edge.blocked_until_s for edge in store.edges()] == [7.0 + 40.0, 0.0, FOR_EVER_S]
+        store.tick(8.0)
+    with TopoStore.open(path) as store:
+        store.tick(1.0)
+        assert store.edge(1).blocked_until_s == pytest.approx(1.0 + 39.0)
 
 
 def test_ids_are_never_used_again(tmp_path):
