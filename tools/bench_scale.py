@@ -29,7 +29,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
-from tools.bench_topo import STEP_M, TIMED, Driver, grown
+from tools.bench_topo import STEP_M, TIMED, Driver, grown, meander, stand_on
 from tools.mapping_runs import table
 from tools.measuring import resident_mb
 
@@ -140,9 +140,9 @@ def run(most_km: float, out: Path) -> list[Size]:
         first_plan(spare, driver.mapper.store.count("node") - 2)  # the newest may not be in the file yet
         driver.mapper.close()
     store = TopoStore.open(path, durable=False) if sizes else TopoStore.create(path, durable=False)
-    driver = Driver(TopoMapper(TopoConfig(durable=False), store, resume=bool(sizes)))
+    driver = Driver(TopoMapper(TopoConfig(durable=False), store))
     if sizes:
-        driver.drive(1)  # the robot stands somewhere again
+        stand_on(driver.mapper, store.count("node"), 0.0, next(meander()))
     for km in todo:
         begun = time.perf_counter()
         driver, size = measure(km, driver, path, not sizes)

@@ -28,7 +28,6 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Edge, Place
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.place import encode_place
-from lemtomap.topo.stand import put_last_stand
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType, GridView, SlamUpdate
 
@@ -160,6 +159,12 @@ def scale(args: argparse.Namespace) -> None:
     driver.mapper.close()
 
 
+def stand_on(mapper: TopoMapper, node_id: int, stamp_s: float, at: Pose) -> None:
+    """Go on with a map at a node that is recognised at once."""
+    mapper.update(said(stamp_s, at), Hall().view(at))
+    mapper.relocate(node_id, at, MATCH_COVARIANCE)
+
+
 def grown(
     driver: Driver, path: Path, target: int, config: TopoConfig, rng: np.random.Generator
 ) -> tuple[Driver, float]:
@@ -167,20 +172,17 @@ def grown(
     at = next(meander(driver.way_m))
     driver.mapper.close()
     with TopoStore.open(path, durable=False) as store:
-        before = store.count("node")
         last = lay_in_bulk(store, target - int(TIMED * STEP_M), rng)
-        if last > before:
-            put_last_stand(store, last, np.array([0.0, 0.0, 0.0]))
     start = time.perf_counter()
-    mapper = TopoMapper(config, TopoStore.open(path, durable=False), resume=True)
-    mapper.update(said(driver.stamp_s, at), Hall().view(at))
+    mapper = TopoMapper(config, TopoStore.open(path, durable=False))
+    stand_on(mapper, last, driver.stamp_s, at)
     return replace(driver, mapper=mapper), time.perf_counter() - start
 
 
 WRITER = """
 import itertools, sys
 import tools.bench_topo as bench
-mapper = bench.TopoMapper(bench.TopoConfig(), bench.TopoStore.open(sys.argv[1]), resume=True)
+mapper = bench.TopoMapper(bench.TopoConfig(), bench.TopoStore.open(sys.argv[1]))
 hall, clock = bench.Hall(), float(sys.argv[2])
 for k, at in enumerate(bench.meander(float(sys.argv[3]))):
     mapper.update(bench.said(clock + 0.1 * k, at), hall.view(at))

@@ -35,7 +35,7 @@ class TopoConfig:
     align_widest_m: float = 0.3  # this standard deviation
     implicit_sigma_m: float = 0.3  # a near neighbour predicted this well may be matched at once
     commit_every_s: float = 0.5  # design section 7: at most a second is lost
-    paged_nodes: int = 4096  # nodes kept in memory, a few hundred bytes each
+    paged_nodes: int = 1024  # nodes kept in memory with their edges, some 2 kB each
     durable: bool = True  # sync to disk with each commit; batch runs over a log need not
 
     def __post_init__(self) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, adjoint, compose, inverse
+from lemtomap.se2 import Pose, adjoint, compose
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import NavEvent
@@ -17,7 +17,6 @@ from lemtomap.topo.local import EdgePicture, LocalMap, Standing
 from lemtomap.topo.neighbours import NeighbourFinder, in_sight
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.protocols import NotStarted, Recogniser, Transform
-from lemtomap.topo.stand import last_stand, put_last_stand
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
 from lemtomap.topo.undoing import cut_off
@@ -53,11 +52,8 @@ class TopoMapper:
         *,
         level: int = 0,
         recogniser: Recogniser | None = None,
-        resume: bool = False,
     ) -> None:
-        """Go on with the store's map. `resume`: the robot stands where it stood when the map was closed;
-        otherwise it starts a new part of the graph, which a closure joins to the rest.
-        """
+        """Go on with the store's map: in a new part of the graph, which a closure joins to the rest."""
         self.config = config
         self.store = store
         self.graph = PagedGraph(store, config.paged_nodes)
@@ -76,7 +72,6 @@ class TopoMapper:
         self.part_id = 1
         """First node of the part of the graph made since the robot was lost or switched on."""
         self._recogniser = recogniser
-        self._resume = resume
         self._neighbours = NeighbourFinder(config)
         self._associated_id = 0
         self._drift: Covariance = np.zeros((3, 3))
@@ -135,22 +130,12 @@ class TopoMapper:
     # -- the steps of Figure 3-6 ----------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        """Stand where the map was left, or on a first node."""
-        left = last_stand(self.store) if self._resume else None
-        if left is None:
-            known = self._recogniser is not None and any(True for _ in self.store.places())
-            self.part_id = self._birth()
-            self.local.settle(self.part_id)
-            if known:
-                self._look_for_place()
-            return
-        node_id, T_node_base = left
-        self._resume = False
-        slam = self._require().slam
-        T_grid_node = compose(slam.T_grid_base, inverse(T_node_base))
-        self.local.anchor(node_id, T_grid_node, _relative_to_window(slam))
-        self._associated_id = node_id
-        self._align_associated()
+        """Stand on a first node; in a map that knows places already, look for one of them."""
+        known = self._recogniser is not None and any(True for _ in self.store.places())
+        self.part_id = self._birth()
+        self.local.settle(self.part_id)
+        if known:
+            self._look_for_place()
 
     def _move(self, before: SlamUpdate, after: SlamUpdate) -> None:
         """Let the covariance of T_node_base grow by the motion since the previous scan."""
@@ -352,7 +337,7 @@ class TopoMapper:
         self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
         self.keeper.forget_window()
         self.local.standings.clear()
-        self._now, self._resume = None, False
+        self._now = None
 
     def found(self) -> None:
         """Say that the robot knows its place again, or that nothing of the map is known here."""
@@ -407,7 +392,6 @@ class TopoMapper:
         """Write everything and close the map file; the trail stays readable."""
         if self._now is not None:
             self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
-            put_last_stand(self.store, self._associated_id, self.T_node_base)
         self.store.close()
 
     def _require(self) -> _Now:

@@ -1,8 +1,8 @@
 """What a `.lemto` file is: one SQLite file with our application id, and the checks before it is trusted.
 
-At rest a small map is only its rows: tables without rows and all indexes are left out of the file, where each
-would take a page, and made again when the map is opened for writing. The checks read only the file's header,
-so a file that is not ours is never touched.
+At rest a small map is only its rows: empty tables, indexes and all else that follows from the rows are left
+out of the file, where each would take a page, and made again when the map is opened for writing. The checks
+read only the file's header, so a file that is not ours is never touched.
 """
 
 import contextlib
@@ -52,15 +52,16 @@ def complete(connection: sqlite3.Connection) -> None:
 
 
 def strip(connection: sqlite3.Connection) -> None:
-    """Leave out empty tables and all indexes, and give their pages back."""
+    """Leave out indexes, triggers, empty tables and those of others (look-ups, which they make again)."""
     connection.execute("BEGIN")
-    for name in INDEXES:
-        connection.execute(f"DROP INDEX {name}")
-    for name in TABLES:
-        if name not in ALWAYS and not connection.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():  # noqa: S608
+    connection.execute("DELETE FROM change")
+    rows = connection.execute("SELECT type, name FROM sqlite_schema WHERE type != 'table'").fetchall()
+    for kind, name in rows:
+        connection.execute(f"DROP {kind} {name}")
+    for name in _tables(connection) - set(ALWAYS):
+        if name not in TABLES or not connection.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():  # noqa: S608
             connection.execute(f"DROP TABLE {name}")
     connection.execute("COMMIT")
-    connection.execute("VACUUM")
 
 
 @contextmanager

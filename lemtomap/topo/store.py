@@ -26,6 +26,7 @@ from lemtomap.topo.rows import (
 )
 
 COMPACT_BELOW_BYTES = 8 << 20  # rewriting a map of this size on closing takes some 50 ms
+STRIP_BELOW_BYTES = 1 << 20  # below this all look-ups are made again within seconds of opening
 FOR_EVER_S = 1e18
 """blocked_until_s of an edge closed by hand."""
 KEPT_CHANGES = 8192  # a reader further behind than this reads afresh
@@ -168,8 +169,11 @@ class TopoStore:
             ):  # a reader holds the file: it stays in WAL mode
                 self._db.execute("PRAGMA busy_timeout = 0")
                 self._db.execute("PRAGMA journal_mode = DELETE")
-                if self.path.stat().st_size < COMPACT_BELOW_BYTES:
+                size = self.path.stat().st_size
+                if size < STRIP_BELOW_BYTES:
                     schema.strip(self._db)
+                if size < COMPACT_BELOW_BYTES:
+                    self._db.execute("VACUUM")
         finally:
             self._db.close()
 

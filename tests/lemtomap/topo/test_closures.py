@@ -72,17 +72,12 @@ def test_a_known_place_recognised_becomes_the_associated_node(loop):
     np.testing.assert_allclose(loop.T_node_base, [-0.2, 0, 0], atol=1e-9)
 
 
-def test_the_robot_goes_on_from_where_the_map_was_closed(tmp_path):
+def test_a_known_map_is_gone_on_with_in_a_part_of_its_own(tmp_path):
     path = tmp_path / "map.lemto"
     mapper = TopoMapper(TopoConfig(), TopoStore.create(path))
     lead(mapper, [(-2, 0), (2.3, 0)], room())
-    here, T_node_base = mapper.associated_id, mapper.T_node_base
+    here = mapper.associated_id
     mapper.close()
-    again = TopoMapper(TopoConfig(), TopoStore.open(path), resume=True)
-    again.update(said(0.0, pose(5, 5, 1.0)), room())
-    assert again.associated_id == here
-    np.testing.assert_allclose(again.T_node_base, T_node_base, atol=1e-9)
-    again.close()
     elsewhere = TopoMapper(TopoConfig(), TopoStore.open(path))
     elsewhere.update(said(0.0, pose(5, 5, 1.0)), room())
     assert elsewhere.associated_id == elsewhere.store.count("node") > here
