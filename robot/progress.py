@@ -1,12 +1,16 @@
 """A progress bar for long work: share, rate, speed against real time, time left; silent on no terminal."""
 
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+COMPILING = "compiling for this machine: some 20 s, this once"
+COMPILING_AFTER_S = 2.0  # kernels that were compiled before load faster
 
 
 @dataclass(slots=True)
@@ -27,6 +31,18 @@ class Bar:
     def say(self, text: str) -> None:
         """Print a line above the bar."""
         self._progress.console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+@contextmanager
+def first_use(bar: Bar) -> Iterator[None]:
+    """Say what takes so long when the body, which runs every kernel once, has to compile them."""
+    timer = threading.Timer(COMPILING_AFTER_S, bar.say, [COMPILING])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @contextmanager

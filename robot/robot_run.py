@@ -18,7 +18,7 @@ from robot import ports
 from robot.config import PortsConfig, RobotConfig, load
 from robot.display import has_display
 from robot.missions import parse_mission
-from robot.progress import Bar
+from robot.progress import Bar, first_use
 from robot.run import Run, RunPlan, Teller
 from robot.runtime import Ports, Runtime
 from robot.teleop import driven_by_hand
@@ -63,7 +63,8 @@ def run_robot(options: RobotOptions, bar: Bar) -> tuple[Path, dict[str, Any]]:
         facts={"mission": options.mission, "kobuki": found.kobuki, "hokuyo": found.hokuyo},
     )
     with Run(plan, Teller(bar, options.duration_s)) as run:
-        warm_up(plan.config, options.slam)
+        with first_use(bar):
+            warm_up(plan.config, options.slam)
         runtime = Runtime(run.core, Ports(_opener(found.kobuki), _opener(found.hokuyo)), run.files)
         with _hands(options, runtime):
             run.end(runtime.run(mission, options.duration_s))

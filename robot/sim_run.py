@@ -11,7 +11,7 @@ from robot.display import has_display
 from robot.exchange import Ended, MissionState
 from robot.lockstep import run_lockstep
 from robot.missions import parse_mission
-from robot.progress import Bar
+from robot.progress import Bar, first_use
 from robot.run import Run, RunPlan, Teller
 from robot.runtime import Ports, Runtime
 from robot.sim_server import FakeHardware
@@ -56,6 +56,9 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
         facts={"world": options.world, "mission": options.mission},
     )
     with Run(plan, Teller(bar, options.duration_s)) as run:
+        if not options.fast:
+            with first_use(bar):
+                warm_up(plan.config, options.slam)
         drive = _drive_fast if options.fast else _drive_in_real_time
         drive(options, run)
     return run.summary
@@ -91,7 +94,6 @@ def _truth(simulator: Simulator) -> dict[str, Any]:
 
 def _drive_in_real_time(options: SimOptions, run: Run) -> None:
     """Run on the wall clock, the simulator in a process of its own behind pseudo-terminals."""
-    warm_up(run.plan.config, options.slam)
     with FakeHardware(options.world, options.seed, gui=options.gui) as hardware:
         run.files.show_world(outlines(worlds.load(options.world)), hardware.true_pose)
         ports = Ports(lambda: open_serial(hardware.kobuki), lambda: open_serial(hardware.hokuyo))
