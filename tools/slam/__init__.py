@@ -1,0 +1,1 @@
+"""What `lemtomap bench slam` measures of the metric layer, a part each."""
