@@ -20,7 +20,7 @@ print(hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest())
 
 def digest(threads: int) -> str:
     environment = {**os.environ, "NUMBA_NUM_THREADS": str(threads), "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
+    done = subprocess.run(  # noqa: S603
         [sys.executable, "-c", CODE], env=environment, cwd=ROOT, capture_output=True, text=True, check=True
     )
     return done.stdout
