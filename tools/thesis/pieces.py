@@ -4,7 +4,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ class Pieces:
         with ThreadPoolExecutor(jobs) as pool:
             futures = [pool.submit(self._do, piece) for piece in todo]
             try:
-                wait(futures, return_when=FIRST_EXCEPTION)
+                wait(futures)  # one that fails keeps no other from being done
             finally:
                 for future in futures:
                     future.cancel()
