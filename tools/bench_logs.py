@@ -130,8 +130,7 @@ def row_of(found: dict[str, Any]) -> list[str]:
     return [
         found["log"],
         found["layer"],
-        f"{found['mean_m']:.4f}",
-        f"{found['median_m']:.4f}",
+        *(f"{found[key]:.4f}" if np.isfinite(found[key]) else "-" for key in ("mean_m", "median_m")),
         f"{np.mean(found['cpu_s']):.1f}",
         f"{found['peak_mb']:.0f}",
         f"{found['grew_mb']:.1f}",

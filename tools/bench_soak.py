@@ -12,6 +12,7 @@ that only the simulator knows. Leaves soak.json, soak.md and soak.png; exit code
 
 import argparse
 import json
+import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -51,6 +52,9 @@ def soak(options: SoakOptions, out: Path) -> None:
     core = build_core(RobotConfig(), map_path, durable=False, seed=options.seed)
     mission = ExploreThenGoals(options.explore_min * 60.0, options.seed)
     (out / "options.json").write_text(json.dumps(asdict(options)))
+    signal.signal(
+        signal.SIGTERM, signal.default_int_handler
+    )  # stopped by another program: report all the same
     try:
         with Watcher(simulator, core, mission, out) as watcher:
             run_lockstep(simulator, core, mission, options.hours * 3600.0, watch=watcher.watch)
