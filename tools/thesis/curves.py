@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -56,8 +57,8 @@ def draw_parts(
     figure.savefig(path)
 
 
-def _finish(axes: "object", title: str) -> None:
-    axes.set_title(title, fontsize=9)  # type: ignore[attr-defined]
-    axes.set_xlabel("drive (min)", fontsize=8)  # type: ignore[attr-defined]
-    axes.tick_params(labelsize=8)  # type: ignore[attr-defined]
-    axes.set_ylim(bottom=0)  # type: ignore[attr-defined]
+def _finish(axes: Axes, title: str) -> None:
+    axes.set_title(title, fontsize=9)
+    axes.set_xlabel("drive (min)", fontsize=8)
+    axes.tick_params(labelsize=8)
+    axes.set_ylim(bottom=0)

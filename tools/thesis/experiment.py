@@ -100,12 +100,9 @@ class Experiment:
         disturbances.
         """
         pieces = [self._navigation(task) for task in reversed(self.tasks)]
-        for drive in reversed(self.drives):
-            pieces += [
-                self._mapping(drive, system, seed)
-                for seed in range(self.plan.repetitions)
-                for system in reversed(self._systems)
-            ]
+        for seed in range(self.plan.repetitions):
+            for drive in reversed(self.drives):
+                pieces += [self._mapping(drive, system, seed) for system in reversed(self._systems)]
         return pieces
 
     def _folder(self, drive: Drive, system: System, seed: int) -> Path:
