@@ -17,7 +17,7 @@ from drivers.kobuki.battery import Level as BatteryLevel
 from drivers.kobuki.docking import Docking
 from drivers.kobuki.events import BumperEvent, CliffEvent, KobukiSample, LinkUp
 from drivers.kobuki.session import KobukiEvent
-from lemtomap.nav.types import NavState
+from lemtomap.nav.types import ContactKind, NavState
 from lemtomap.odometry import OdometryBuffer, WheelGyroOdometry
 from lemtomap.se2 import Pose
 from lemtomap.types import Odometry, Scan, Twist
@@ -66,11 +66,12 @@ class BaseStep:
 
     def take(self, base: Sequence[KobukiEvent], laser: Sequence[HokuyoEvent], now_s: float) -> None:
         """Take what the devices told since the last call."""
+        hangs = any(isinstance(event, KobukiSample) and event.wheel_drop for event in base)
         for event in base:
             if isinstance(event, KobukiSample):
                 self._take_sample(event)
             else:
-                self._take_event(event, now_s)
+                self._take_event(event, now_s, lifted=hangs or self._hangs)
         for seen in laser:
             if isinstance(seen, LaserScan):
                 self._waiting.append(seen)
@@ -113,9 +114,13 @@ class BaseStep:
         else:
             self._mux.offer(DOCKING, Twist(output.v_mps, output.w_radps), sample.arrival_s)
 
-    def _take_event(self, event: KobukiEvent, now_s: float) -> None:
+    @property
+    def _hangs(self) -> bool:
+        return self._sample is not None and bool(self._sample.wheel_drop)
+
+    def _take_event(self, event: KobukiEvent, now_s: float, *, lifted: bool) -> None:
         contact = bridge.contact_of(event)
-        if contact is not None:
+        if contact is not None and not (lifted and contact.kind is ContactKind.CLIFF):  # no floor in the air
             self._exchange.contacts.put(contact)
             self._retreat.contact(self._smoother.sent.v_mps, now_s)
         if isinstance(event, BumperEvent) and event.pressed:
@@ -149,8 +154,7 @@ class BaseStep:
         sighting = bridge.deskewed_sighting(scan, poses)
         odometry = self._buffer.odometry_at(scan.stamp_s)
         valid = int(np.count_nonzero(~np.isnan(scan.ranges_m)))
-        lifted = self._sample is not None and bool(self._sample.wheel_drop)
-        timed = TimedScan(scan, odometry, sighting, seen.arrival_s, valid, lifted)
+        timed = TimedScan(scan, odometry, sighting, seen.arrival_s, valid, self._hangs)
         self._scan = timed
         if seen.complete:  # a damaged scan still shows obstacles, but never reaches the map
             self._exchange.scans.put(timed)

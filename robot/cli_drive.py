@@ -35,6 +35,7 @@ def register(app: typer.Typer) -> None:
         sim,
         "lemtomap sim                                        explore the office, drive to its far end",
         "lemtomap sim --fast --mission goto:12               lock-step: explore, then go there",
+        "lemtomap sim --map office.lemto --mission goto:12   find its place in that map, then go",
         "lemtomap sim --world plan.yaml --duration 600       any ROS map_server floor plan",
         "lemtomap sim --serve                                only the fake hardware, on two pseudo-terminals",
     )
@@ -90,6 +91,7 @@ def sim(
     ] = False,
     serve: Annotated[bool, typer.Option("--serve", help="only the fake hardware, until interrupted")] = False,
     seed: Annotated[int, typer.Option(metavar="N", help="of noise in the world and of the particles")] = 0,
+    map_file: MapFile = None,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="folder for the results; an earlier run's are replaced")
     ] = Path("runs/sim"),
@@ -107,7 +109,7 @@ def sim(
     from robot.sim_run import SimOptions, run_sim
     from robot.told import told_after_run
 
-    options = SimOptions(world, mission, duration, out, seed, fast=fast, gui=gui)
+    options = SimOptions(world, mission, duration, out, seed, fast=fast, gui=gui, map_path=map_file)
     with progress_bar(f"sim {world}") as bar:
         summary = run_sim(options, bar)
     typer.echo(told_after_run(out, summary))

@@ -1,11 +1,14 @@
 """The navigation part of the robot: 10 times a second, mission -> goal -> velocity, in its own thread."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 from lemtomap.nav.navigator import Navigator
-from lemtomap.types import RouteGraph, Twist
+from lemtomap.nav.types import Goal
+from lemtomap.types import MapView, RouteGraph, Twist
 from robot.exchange import Exchange, Level, MissionState, MissionStatus
+from robot.finding import Finder
 from robot.missions import Idle, Mission, Moment
 
 
@@ -34,6 +37,9 @@ class NavigationStep:
         self._graph: ClosableGraph | None = None
         self._status = MissionStatus(0.0, MissionState.WAITING)
         self._start_id = 1
+        self._finder: Finder | None = None
+        """At work while the robot is lost."""
+        self._interrupted: Goal | None = None
 
     def step(self, now_s: float) -> None:
         """Run one cycle; does nothing before the first map."""
@@ -42,6 +48,7 @@ class NavigationStep:
             return
         if self._graph is None:
             self._graph, self._start_id = self._open_graph(), view.associated_id
+        view = self._lost_or_found(view, now_s)
         _ = self._graph.version  # asked once a cycle: here the reader forgets what has changed
         output = self.navigator.step(
             view,
@@ -72,7 +79,7 @@ class NavigationStep:
         if self._status.state.over:
             return
         now_s = moment.now_s
-        order = self.mission.step(moment)
+        order = self.mission.step(moment) if self._finder is None else self._finder.step(moment)
         if order.goal is not None:
             self.navigator.set_goal(order.goal, now_s)
         elif order.cancel:
@@ -87,10 +94,32 @@ class NavigationStep:
         self._status = MissionStatus(now_s, order.state, order.text)
         self._exchange.mission.put(self._status)
 
+    def _lost_or_found(self, view: MapView, now_s: float) -> MapView:
+        """Stop what is under way when the robot is lost, go on with it when it is found again.
+
+        Returns the view to navigate by: with a mission the robot drives about in what it maps while lost.
+        """
+        if not view.lost:
+            if self._finder is not None:
+                self._finder = None
+                self.navigator.cancel()
+                if self._interrupted is not None:
+                    self.navigator.set_goal(self._interrupted, now_s)
+            return view
+        if isinstance(self.mission, Idle) or self._status.state.over:
+            return view
+        if self._finder is None:
+            self._interrupted = self.navigator.goal
+            self.navigator.cancel()
+            self.navigator.surroundings.forget_window()
+            self._finder = Finder(self.navigator.config, now_s)
+        return replace(view, lost=False)
+
     def set_mission(self, mission: Mission) -> None:
         """Take a new mission; the present goal is dropped."""
         self.navigator.cancel()
         self.mission, self._status = mission, MissionStatus(0.0, MissionState.WAITING)
+        self._finder = self._interrupted = None
 
     def close(self) -> None:
         """Close the map's reader."""

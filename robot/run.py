@@ -32,6 +32,8 @@ class RunPlan:
     live: bool = False
     replace: bool = False
     """True: an earlier run's results in the folder go."""
+    keep_map: bool = False
+    """True: except the map, which this run goes on with."""
     facts: Mapping[str, Any] = field(default_factory=dict)
     """For the summary."""
 
@@ -115,6 +117,7 @@ class Run:
 
 def _clear(plan: RunPlan) -> None:
     """Remove an earlier run's results."""
-    for path in (plan.map_path, *(plan.out / name for name in RESULTS)):
+    old_map = [] if plan.keep_map else [plan.map_path]
+    for path in (*old_map, *(plan.out / name for name in RESULTS)):
         for suffix in ("", "-wal", "-shm"):
             path.with_name(path.name + suffix).unlink(missing_ok=True)

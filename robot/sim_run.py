@@ -6,6 +6,7 @@ from typing import Any
 
 from drivers.port import open_serial
 from lemtomap.grid import DEFAULT_SLAM
+from lemtomap.topo.reader import TopoReader
 from robot.config import RobotConfig
 from robot.display import has_display
 from robot.exchange import Ended, MissionState
@@ -36,23 +37,30 @@ class SimOptions:
     fast: bool = False
     gui: bool = False
     live: bool = True
+    map_path: Path | None = None
+    """A map to go on with, wherever in it the robot stands; None: a new one."""
 
 
 def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
     """Run until the mission is over or the time is up; return the summary. Raises BadWorld, BadSetting."""
     worlds.load(options.world)
+    if options.map_path is not None and options.map_path.exists():
+        TopoReader(options.map_path).close()
     parse_mission(options.mission)
-    if options.mission.startswith("goto:"):  # the map is empty: see the building first
+    if (
+        options.mission.startswith("goto:") and options.map_path is None
+    ):  # the map is empty: see the building first
         options = replace(options, mission=f"explore,{options.mission}")
     plan = RunPlan(
         out=options.out,
-        map_path=options.out / "map.lemto",
+        map_path=options.map_path or options.out / "map.lemto",
         title=f"{Path(options.world).stem}: {options.mission}",
         seed=options.seed,
         slam=options.slam,
         config=RobotConfig(),
         live=options.live and has_display(),
         replace=True,
+        keep_map=options.map_path is not None,
         facts={"world": options.world, "mission": options.mission},
     )
     with Run(plan, Teller(bar, options.duration_s)) as run:

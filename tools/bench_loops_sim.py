@@ -1,14 +1,14 @@
 """Closures, cold starts, kidnaps and changed buildings in simulation, judged by truth.
 
     lemtomap bench loops_sim closures [--seeds 10] [--willow willow.yaml]   wrong closures, revisits closed
-    lemtomap bench loops_sim cold     [--world office] [--starts 50]        switched on anywhere in a known map
+    lemtomap bench loops_sim cold     [--world office] [--starts 50]        switched on anywhere in a map
     lemtomap bench loops_sim kidnap   [--world office] [--starts 50]        carried or pushed somewhere else
-    lemtomap bench loops_sim change   [--world office] [--starts 50]        furniture moved, doors shut over night
+    lemtomap bench loops_sim change   [--world office] [--starts 50]        furniture moved, doors shut
     lemtomap bench loops_sim steady   [--world office] [--rounds 12]        does the map stop growing?
     lemtomap bench loops_sim lookup   [--nodes 1000000]                     time of one look-up
 
-What was measured stands in --out, one file a case, and is not measured again: stop and go on as you like. Only
-mapping runs: real bytes through drivers, odometry, window and topological map, led by a script.
+What was measured stands in --out, one file a case, and is not measured again: stop and go on as you like.
+Only mapping runs: real bytes through drivers, odometry, window and topological map, led by a script.
 """
 
 import argparse
@@ -18,30 +18,26 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lemtomap.se2 import Pose
 from lemtomap.topo.loops.descriptor import BYTES
 from lemtomap.topo.loops.index import PlaceIndex
-from sim.route import RoutePlanner
-from sim.tours import Tour, plan_tour
+from sim.tours import plan_tour
 from sim.world import World
 from tools.mapping_runs import table
 from tools.sim_buildings import building, next_day
-from tools.sim_maps import BINS, JudgedMap, load_born, still_true
+from tools.sim_maps import BINS, JudgedMap, still_true
 from tools.sim_robot import SimRobot
+from tools.sim_trials import LIMIT_M, LIMIT_S, Found, Trial
 
 CLOSURE_WORLDS = {"office@3": 600.0, "loop": 420.0, "alike:16": 420.0, "offices:24": 600.0}  # seconds of tour
 WILLOW_S, WILLOW_LARGE_S = 600.0, 1200.0
 MAP_S = {"office": 420.0}
 MAP_USUAL_S = 5000.0  # of a tour that is to see a whole floor
-TURN_S, TURN_RADPS = 6.6, 1.0  # a lost robot looks round once before it drives
-LIMIT_S, LIMIT_M = 30.0, 3.0
-RIGHT_M, RIGHT_RAD = 0.3, 0.1  # found at the right place; how exactly, the poses' quality tells
-Found = dict[str, Any]
 
 
 def main(arguments: list[str]) -> int:
@@ -80,7 +76,7 @@ def closures(options: argparse.Namespace) -> None:
     for seed in range(options.seeds):
         for name, seconds in cases.items():
             case = options.out / f"closures-{_key(name)}-{seed}"
-            found[name].append(_kept(case, lambda n=name, s=seed, t=seconds, c=case: _mapped(n, s, t, c)))
+            found[name].append(_kept(case, partial(_mapped, name, seed, seconds, case)))
             print(f"{Path(name).name} {seed}: {_brief(found[name][-1])}", flush=True)
     rows = [[Path(name).name, *_closure_row(each)] for name, each in found.items()]
     rows.append(["all", *_closure_row([each for many in found.values() for each in many])])
@@ -105,7 +101,8 @@ def _seeded(name: str, seed: int) -> str:
 
 
 def _brief(found: Found) -> str:
-    return f"{found['closures']} closures, {found['wrong']} wrong, {found['closed']} revisits closed, " + (
+    return (
+        f"{found['closures']} closures, {found['wrong']} wrong, {found['closed']} revisits closed, "
         f"{found['missed']} missed, {found['nodes']} nodes, {found['cpu_s']:.0f} s CPU"
     )
 
@@ -137,18 +134,17 @@ def _closure_row(found: Sequence[Found]) -> list[str]:
 def cold(options: argparse.Namespace) -> None:
     """Switch the robot on at random places of a mapped building."""
     world = building(options.world)
-    _campaign("cold", options, lambda seed: _started(_place(options, world), world, seed, options))
+    trial = Trial(_place(options, world), options.out)
+    _campaign("cold", options, lambda seed: trial.started(world, seed))
 
 
 def change(options: argparse.Namespace) -> None:
-    """The same the day after; then let the robot drive three rounds, and see what of its map is still true."""
+    """The same the day after; then drive three rounds there, and see what of the map is still true."""
     world = building(options.world)
     source = _place(options, world)
 
-    def start(seed: int) -> Found:
-        return _started(source, next_day(world, seed), seed, options)
-
-    _campaign("change", options, start)
+    trial = Trial(source, options.out)
+    _campaign("change", options, lambda seed: trial.started(next_day(world, seed), seed))
     rounds = _kept(options.out / f"follow-{_key(options.world)}", lambda: _followed(source, world, options))
     shares = "  ".join(f"{share:.1%}" for share in rounds["true"])
     print(f"stored points that stand in the changed building, before and after each round: {shares}")
@@ -158,15 +154,15 @@ def change(options: argparse.Namespace) -> None:
 def kidnap(options: argparse.Namespace) -> None:
     """Carry or push the robot, which knows where it is, somewhere else; every second time no wheel tells."""
     world = building(options.world)
-    source = _place(options, world)
-    _campaign("kidnap", options, lambda seed: _carried(source, world, seed, options))
+    trial = Trial(_place(options, world), options.out)
+    _campaign("kidnap", options, lambda seed: trial.carried(world, seed))
 
 
 def _campaign(part: str, options: argparse.Namespace, run: Callable[[int], Found]) -> None:
     found = []
     for seed in range(options.starts):
         case = options.out / f"{part}-{_key(options.world)}-{seed}"
-        found.append(_kept(case, lambda s=seed: run(s)))
+        found.append(_kept(case, partial(run, seed)))
         print(f"{part} {seed}: {found[-1]['told']}", flush=True)
     ok, wrong = sum(each["ok"] for each in found), sum(each["wrong"] for each in found)
     way_m = [each["way_m"] for each in found if each["found"]]
@@ -181,128 +177,6 @@ def _campaign(part: str, options: argparse.Namespace, run: Callable[[int], Found
             f"time: median {np.median(time_s):.1f} s, 95 % {np.percentile(time_s, 95):.1f} s"
         )
     _print_quality(each["score"] for each in found)
-
-
-def _started(source: Path, world: World, seed: int, options: argparse.Namespace) -> Found:
-    """Put the robot down anywhere near a known node and wait until it knows where it is."""
-    rng = np.random.default_rng([seed, 1])
-    robot, judged, path = _robot_on(source, world, seed, options)
-    start = _known_place(path, world, rng)
-    robot.put(start)
-    found = _find(robot, judged, world, rng)
-    return _told(found, robot, judged, path, noticed=True)
-
-
-def _carried(source: Path, world: World, seed: int, options: argparse.Namespace) -> Found:
-    """Let the robot find itself, drive a bit, carry it, and wait until it knows again."""
-    rng = np.random.default_rng([seed, 2])
-    robot, judged, path = _robot_on(source, world, seed, options)
-    robot.put(_known_place(path, world, rng))
-    _find(robot, judged, world, rng, limit_s=60.0, limit_m=10.0)
-    end = _known_place(path, world, rng)
-    lost = False
-    if seed % 2:
-        robot.put(end)
-    else:
-        judged.feed(robot.carry(end))
-    for seen in robot.stand(2.0):
-        judged.take(seen)
-        lost = lost or judged.view.lost
-    found = _find(robot, judged, world, rng)
-    return _told(found, robot, judged, path, noticed=lost)
-
-
-def _find(
-    robot: SimRobot,
-    judged: JudgedMap,
-    world: World,
-    rng: np.random.Generator,
-    limit_s: float = LIMIT_S,
-    limit_m: float = LIMIT_M,
-) -> Found:
-    """Look round and drive somewhere until the robot says that it knows its place."""
-    begun_s, begun_m = robot.now_s, judged.score.path_m
-    found: Found = {
-        "found": False,
-        "right": False,
-        "way_m": 0.0,
-        "time_s": 0.0,
-        "off_m": -1.0,
-        "off_rad": -1.0,
-    }
-    for seen in _search(robot, world, rng, limit_s):
-        judged.take(seen)
-        way_m = judged.score.path_m - begun_m
-        if judged.exchange.map_view.get() is not None and not judged.view.lost and not seen.timed.lifted:
-            off_m, off_rad = judged.error(seen.T_world_base)
-            return found | {
-                "found": True,
-                "right": off_m <= RIGHT_M and off_rad <= RIGHT_RAD and _is_joined(judged),
-                "way_m": way_m,
-                "time_s": robot.now_s - begun_s,
-                "off_m": off_m,
-                "off_rad": off_rad,
-            }
-        if way_m > 3.0 * limit_m:
-            break
-    return found
-
-
-def _search(robot: SimRobot, world: World, rng: np.random.Generator, limit_s: float) -> Iterator[Any]:
-    yield from robot.stand(1.0)
-    yield from robot.stand(TURN_S, TURN_RADPS)
-    yield from robot.drive(_wander(world, robot.T_world_base, rng), 2.0 * limit_s)
-
-
-def _wander(world: World, T_world_base: Pose, rng: np.random.Generator) -> Tour:
-    """Return a way through random places from here."""
-    planner = RoutePlanner(world.raster)
-    here = (float(T_world_base[0]), float(T_world_base[1]))
-    places = planner.places(here, 1.0)
-    goals = [places[index] for index in rng.integers(len(places), size=3)]
-    return Tour(
-        planner.through([here, *[goal for goal in goals if np.hypot(*np.subtract(goal, here)) > 1.0]])
-    )
-
-
-def _told(found: Found, robot: SimRobot, judged: JudgedMap, path: Path, *, noticed: bool) -> Found:
-    robot.close()
-    score = judged.close()
-    for file in (path, path.with_suffix(".born.json")):
-        file.unlink()
-    in_time = found["way_m"] <= LIMIT_M and found["time_s"] <= LIMIT_S
-    ok = bool(noticed and found["right"] and in_time)
-    wrong = bool(score.wrong or (found["found"] and not found["right"]) or not noticed)
-    told = "not noticed" if not noticed else "not found"
-    if found["found"]:
-        told = (
-            f"{'right' if found['right'] else 'WRONG'} after {found['way_m']:.1f} m, {found['time_s']:.1f} s"
-        )
-        told += f", {found['off_m']:.3f} m off"
-    return found | {"ok": ok, "wrong": wrong, "told": told, "score": asdict(score)}
-
-
-def _is_joined(judged: JudgedMap) -> bool:
-    """Tell whether the robot's node hangs together with the map of before."""
-    return 1 in judged.mapper.graph.reach(judged.view.associated_id, 1e9)
-
-
-def _robot_on(
-    source: Path, world: World, seed: int, options: argparse.Namespace
-) -> tuple[SimRobot, JudgedMap, Path]:
-    path = options.out / f"trial-{_key(options.world)}-{options.part}.lemto"
-    for end in (".lemto", ".born.json"):
-        path.with_suffix(end).write_bytes(source.with_suffix(end).read_bytes())
-    return SimRobot(world, 1000 + seed), JudgedMap(path, world), path
-
-
-def _known_place(path: Path, world: World, rng: np.random.Generator) -> Pose:
-    """Return a random pose within reach of the building's start and at most 1.5 m from a known node."""
-    nodes = np.array([T[:2] for T in load_born(path).values()])
-    places = np.array(RoutePlanner(world.raster).places(world.spawn[:2], 0.5))
-    gap_m = np.hypot(*(places[:, None] - nodes[None]).transpose(2, 0, 1)).min(axis=1)
-    chosen = places[rng.choice(np.flatnonzero(gap_m <= 1.5))]
-    return np.array([*chosen, rng.uniform(-np.pi, np.pi)])
 
 
 def _place(options: argparse.Namespace, world: World) -> Path:
@@ -347,7 +221,7 @@ def steady(options: argparse.Namespace) -> None:
         path.unlink(missing_ok=True)
     for seed in range(options.rounds):
         case = options.out / f"steady-{_key(options.world)}-{seed}"
-        found = _kept(case, lambda s=seed: _tour(path, world, MAP_S.get(options.world, MAP_USUAL_S), seed=s))
+        found = _kept(case, partial(_tour, path, world, MAP_S.get(options.world, MAP_USUAL_S), seed))
         print(f"round {seed + 1}: {_brief(found)}", flush=True)
 
 

@@ -50,6 +50,11 @@ class Surroundings:
         self._hazards: list[Hazard] = []
         self._recalled = False
 
+    def forget_window(self) -> None:
+        """Forget what was seen in the grid frame, which begins anew; what was touched is kept by node."""
+        self._costmap = Costmap(self._config.costmap, self._config.body)
+        self._sightings.clear()
+
     def recall(self, graph: RouteGraph, now_s: float) -> None:
         """Take over, once, what earlier drives felt, if the graph keeps it."""
         if not self._recalled and isinstance(graph, RemembersMarks):

@@ -1,18 +1,28 @@
 """A robot switched on somewhere in a map it knows, and carried elsewhere: lost, and right again."""
 
+import shutil
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lemtomap.grid import SlamConfig, WindowMatcher
 from lemtomap.se2 import between, compose
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.events import Bumped
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.store import TopoStore
-from robot.exchange import Exchange
+from robot.build import build_core
+from robot.config import RobotConfig
+from robot.exchange import Exchange, MissionState
+from robot.lockstep import run_lockstep
 from robot.mapping import MappingStep
+from robot.missions import parse_mission
+from robot.safety import Reason
 from sim import worlds
 from sim.route import RoutePlanner
+from sim.simulator import Simulator
 from sim.tours import Tour
 from tools.sim_robot import SimRobot
 
@@ -95,3 +105,32 @@ def test_a_carried_robot_says_so_and_finds_itself_again(mapped):
     assert len(joined) == mapping.step.mapper.store.count("node")
     mapping.step.close()
     robot.close()
+
+
+def test_a_robot_sent_to_a_place_looks_round_finds_itself_and_goes_there(mapped, tmp_path):
+    world, path, born = mapped
+    own = tmp_path / "own.lemto"
+    shutil.copy(path, own)
+    simulator = Simulator(replace(world, spawn=(5.4, 3.0, 2.0)), seed=4)
+    core = build_core(RobotConfig(), own, durable=False)
+    goal = min(born, key=lambda node_id: float(np.hypot(*(born[node_id][:2] - [7.5, 5.0]))))
+    ended = run_lockstep(simulator, core, parse_mission(f"goto:{goal}"), 60.0)
+    assert ended.state is MissionState.DONE, ended.text
+    assert np.hypot(*(simulator.truth().T_world_base - born[goal])[:2]) < 0.5
+    told = [note.text for note in core.exchange.notes.drain()]
+    assert told.index("lost: looking for its place in the map") < told.index(f"going to {goal}")
+    core.close()
+    simulator.close()
+
+
+def test_a_lifted_robot_remembers_no_cliffs(mapped, tmp_path):
+    world, _, _ = mapped
+    simulator = Simulator(world, seed=4)
+    core = build_core(RobotConfig(), tmp_path / "own.lemto", durable=False)
+    run_lockstep(simulator, core, parse_mission("idle"), 1.0)
+    simulator.base.lifted = True
+    run_lockstep(simulator, core, parse_mission("idle"), 1.0)
+    assert core.exchange.base_status.get().sent.reason is Reason.WHEEL_DROP
+    assert not any(isinstance(event, Bumped) for event in core.exchange.nav_events.drain())
+    core.close()
+    simulator.close()
