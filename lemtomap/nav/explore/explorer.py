@@ -9,10 +9,11 @@ import numpy as np
 from lemtomap import se2
 from lemtomap.nav.config import ExploreConfig, NavConfig
 from lemtomap.nav.costmap import Costmap
-from lemtomap.nav.explore.frontier import find_openings, still_open, unseen_patches
+from lemtomap.nav.explore.frontier import find_openings
+from lemtomap.nav.explore.ground import Ground
 from lemtomap.nav.explore.memory import SeenMemory
 from lemtomap.nav.explore.openings import Openings
-from lemtomap.nav.explore.prices import Here, price_openings
+from lemtomap.nav.explore.prices import Here, Price, price_openings
 from lemtomap.nav.metric import Reach, reach_from
 from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.types import Goal, NavOutput, NavState
@@ -20,6 +21,8 @@ from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent
 from lemtomap.topo.graph import OpeningState, Placeholder
 from lemtomap.types import MapView, RouteGraph
+
+AT_NODE = (0.0, 0.0)
 
 
 @runtime_checkable
@@ -56,6 +59,11 @@ class _Pursuit:
     arrived_s: float | None = None
     facing: bool = False
     """Having arrived, the robot was told to look into the opening."""
+
+    @property
+    def direct(self) -> bool:
+        """Tell whether the goal is the opening itself, not the node from which it was seen."""
+        return self.goal.p_node != AT_NODE
 
 
 class Explorer:
@@ -116,9 +124,9 @@ class Explorer:
         reach = reach_from(costs, T_grid_base)
         self._memory.take(costs, map_view.T_grid_node, T_grid_base)
         seen = self._memory.recall(costs, map_view.T_grid_node)
-        large = unseen_patches(seen, costs.resolution_m, config.least_depth_m)
-        openings = find_openings(reach, large, config.least_size_m)
-        self._openings.match(openings, map_view.T_grid_node, lambda place: still_open(costs, large, place))
+        ground = Ground.of(costs, seen, config.least_depth_m)
+        openings = find_openings(reach, ground, config.least_size_m)
+        self._openings.match(openings, ground, map_view.T_grid_node, map_view.associated_id)
         return reach
 
     def _judge(self, navigation: NavOutput | None, now_s: float) -> None:
@@ -137,7 +145,10 @@ class Explorer:
         elif navigation.state == NavState.ARRIVED:
             pursuit.arrived_s = now_s if pursuit.arrived_s is None else pursuit.arrived_s
             if pursuit.facing and now_s - pursuit.arrived_s > self.config.linger_s:
-                self._openings.spend(pursuit.number)
+                if pursuit.direct:
+                    self._openings.spend(pursuit.number)
+                else:
+                    self._give_up(pursuit.number, now_s)
                 self._pursuit = None
 
     def _give_up(self, number: int, now_s: float) -> None:
@@ -146,12 +157,12 @@ class Explorer:
     def _choose(self, here: Here) -> Goal | None:
         """Return a new goal if another opening is to be pursued, or the pursued one has moved."""
         pursuit = self._pursuit
-        if pursuit is not None and pursuit.arrived_s is not None:
-            return self._face(pursuit, here.now_s)
         ready = self._openings.ready(here.now_s)
-        if not ready:
-            return None
-        prices = price_openings(ready, here, self.config)
+        prices = price_openings(ready, here, self.config) if ready else {}
+        if pursuit is not None and pursuit.arrived_s is not None:
+            price = prices.get(pursuit.number)
+            if pursuit.direct or price is None or not price.direct:
+                return self._face(pursuit, here.now_s)
         if not prices:
             for placeholder in ready:
                 self._give_up(placeholder.placeholder_id, here.now_s)
@@ -159,7 +170,8 @@ class Explorer:
         number = min(prices, key=lambda n: prices[n])
         pursued = None if pursuit is None else prices.get(pursuit.number)
         if pursuit is not None and pursued is not None:
-            number = number if prices[number] < self.config.switch_share * pursued else pursuit.number
+            better = prices[number].way_m < self.config.switch_share * pursued.way_m
+            number = number if better else pursuit.number
         opening = next(p for p in ready if p.placeholder_id == number)
         return self._pursue(opening, prices[number], here.now_s)
 
@@ -169,21 +181,23 @@ class Explorer:
         if pursuit.facing or opening is None:
             return None
         pursuit.facing, pursuit.arrived_s, pursuit.told_s = True, None, now_s
-        return replace(
-            pursuit.goal, yaw_node_rad=opening.yaw_rad, tolerance_m=2.0 * self.config.goal_tolerance_m
-        )
+        yaw_rad = opening.yaw_rad if pursuit.direct else float(np.arctan2(opening.y_m, opening.x_m))
+        return replace(pursuit.goal, yaw_node_rad=yaw_rad, tolerance_m=2.0 * self.config.goal_tolerance_m)
 
-    def _pursue(self, opening: Placeholder, price_m: float, now_s: float) -> Goal | None:
-        """Return the goal at an opening if the navigator is not on its way there already."""
-        goal = Goal(opening.node_id, (opening.x_m, opening.y_m), None, self.config.goal_tolerance_m)
-        until_s = now_s + self.config.patience_s + price_m / self.config.slow_mps
+    def _pursue(self, opening: Placeholder, price: Price, now_s: float) -> Goal | None:
+        """Return the goal at an opening if the navigator is not on its way there already.
+
+        Where unseen floor lies before the opening, because the window forgot it, the robot goes to the node
+        from which it was seen.
+        """
+        place = (opening.x_m, opening.y_m) if price.direct else AT_NODE
+        goal = Goal(opening.node_id, place, None, self.config.goal_tolerance_m)
         pursuit = self._pursuit
-        if pursuit is None or pursuit.number != opening.placeholder_id:
-            self._pursuit = _Pursuit(opening.placeholder_id, goal, until_s, now_s)
-            return goal
-        if _same_place(pursuit.goal, goal):
+        same = pursuit is not None and pursuit.number == opening.placeholder_id
+        if pursuit is not None and same and _same_place(pursuit.goal, goal):
             return None
-        pursuit.goal, pursuit.told_s, pursuit.until_s = goal, now_s, until_s
+        until_s = now_s + self.config.patience_s + price.way_m / self.config.slow_mps
+        self._pursuit = _Pursuit(opening.placeholder_id, goal, until_s, now_s)
         return goal
 
     def _lists(self) -> tuple[tuple[Placeholder, ...], tuple[Placeholder, ...]]:

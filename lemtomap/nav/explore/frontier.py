@@ -3,18 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore import kernels
+from lemtomap.nav.explore.ground import NEAR_CELLS, Ground
 from lemtomap.nav.metric import Reach
 
 JOIN_CELLS = 2
 """Frontier cells this near to each other belong to one opening."""
-NEAR_CELLS = 4
-"""Remembered ground is drawn this much too large; new ground begins beyond."""
-JUDGED_M = 0.5
-"""Nearer to the window's border than this nothing is said about an opening."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,24 +24,9 @@ class Opening:
     size_m: float
 
 
-def unseen_patches(seen: NDArray[np.uint8], resolution_m: float, least_depth_m: float) -> NDArray[np.uint8]:
-    """Return uint8 (rows, cols), 1 on unseen ground that holds a square of twice least_depth_m.
-
-    seen: uint8 (rows, cols), 1 where the ground is known or was known once.
-    """
-    return np.asarray(kernels.large_unknown(seen, max(1, round(least_depth_m / resolution_m))))
-
-
-def still_open(costs: Costs, large: NDArray[np.uint8], p_grid: ArrayLike) -> bool:
-    """Tell whether an opening at a place of the window still may lead to unseen ground."""
-    if not costs.holds(p_grid, JUDGED_M):
-        return True
-    return bool(kernels.dark_in_sight(costs.state, large, *costs.cell(p_grid), NEAR_CELLS + 2.0))
-
-
-def find_openings(reach: Reach, large: NDArray[np.uint8], least_size_m: float) -> list[Opening]:
+def find_openings(reach: Reach, ground: Ground, least_size_m: float) -> list[Opening]:
     """Return the openings of the window onto large unseen patches."""
-    res = reach.costs.resolution_m
+    res, large = reach.costs.resolution_m, ground.large
     mask = kernels.frontier_cells(reach.level, reach.costs.state, large, NEAR_CELLS)
     label = np.zeros(mask.shape, dtype=np.int32)
     count = kernels.label_clusters(mask, label, JOIN_CELLS)

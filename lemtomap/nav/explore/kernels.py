@@ -75,6 +75,21 @@ def frontier_cells(reach: U1, state: U1, large: U1, near: int) -> U1:
 
 
 @njit(nogil=True, cache=True)
+def worst_between(state: U1, row0: float, col0: float, row1: float, col1: float) -> int:
+    """Return the worst state on a straight line; what lies outside the window is UNKNOWN."""
+    height, width = state.shape
+    steps = int(2.0 * max(abs(row1 - row0), abs(col1 - col0))) + 1
+    worst = FREE
+    for k in range(steps + 1):
+        r, c = int(row0 + (row1 - row0) * k / steps), int(col0 + (col1 - col0) * k / steps)
+        here = state[r, c] if 0 <= r < height and 0 <= c < width else UNKNOWN
+        if here == LETHAL:
+            return LETHAL
+        worst = max(worst, here)
+    return worst
+
+
+@njit(nogil=True, cache=True)
 def dark_in_sight(state: U1, large: U1, row: float, col: float, radius: float) -> bool:
     """Tell whether a large unseen patch lies within radius (cells) of a place, not behind an obstacle.
 
@@ -93,17 +108,9 @@ def dark_in_sight(state: U1, large: U1, row: float, col: float, radius: float) -
         return True
     for r in range(r0, r1):
         for c in range(c0, c1):
-            dr, dc = r - here_r, c - here_c
-            if not large[r, c] or dr * dr + dc * dc > radius * radius:
+            if not large[r, c] or (r - here_r) ** 2 + (c - here_c) ** 2 > radius * radius:
                 continue
-            steps = 2 * max(abs(dr), abs(dc))
-            clear = True
-            for k in range(1, steps):
-                rr, cc = round(here_r + dr * k / steps), round(here_c + dc * k / steps)
-                if state[rr, cc] == LETHAL:
-                    clear = False
-                    break
-            if clear:
+            if worst_between(state, here_r + 0.5, here_c + 0.5, r + 0.5, c + 0.5) != LETHAL:
                 return True
     return False
 

@@ -1,13 +1,13 @@
 """Placeholders: openings kept in the frames of nodes, so that they outlive the window (thesis, 7-2)."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.nav.explore.frontier import Opening
+from lemtomap.nav.explore.ground import Ground
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent, OpeningDone, OpeningSeen
 from lemtomap.topo.graph import OpeningState, Placeholder
@@ -66,12 +66,13 @@ class Openings:
     def match(
         self,
         openings: Sequence[Opening],
+        ground: Ground,
         T_grid_node: Mapping[int, Pose],
-        still_open: Callable[[NDArray[np.float64]], bool],
+        here_id: int,
     ) -> None:
         """Join the openings in the window now with those known; drop known ones that turn out explored.
 
-        still_open: tells of a place in the grid frame whether it may still lead to unseen ground.
+        here_id: the node the robot is at.
         """
         places = {
             number: se2.transform(T_grid_node[kept.placeholder.node_id], _point(kept.placeholder))
@@ -80,24 +81,25 @@ class Openings:
         }
         free = dict(places)
         for opening in sorted(openings, key=lambda o: -o.size_m):
-            number = _nearest(opening.p_grid, free)
+            number = _same(opening.p_grid, free, ground)
             if number is not None:
                 del free[number]
-            elif _nearest(opening.p_grid, places) is not None:
+            elif _same(opening.p_grid, places, ground) is not None:
                 continue  # a second piece of an opening already matched
-            self._keep(number, opening, T_grid_node)
+            known_from = here_id if number is None else self._kept[number].placeholder.node_id
+            node_id = ground.node_in_sight(opening.p_grid, T_grid_node, known_from)
+            self._keep(number, opening, node_id, T_grid_node[node_id])
         for number, place in free.items():
             kept = self._kept[number]
-            if kept.placeholder.state == OpeningState.OPEN and not still_open(place):
+            if kept.placeholder.state == OpeningState.OPEN and not ground.still_open(place):
                 self.done(number, closed=False)
 
-    def _keep(self, number: int | None, opening: Opening, T_grid_node: Mapping[int, Pose]) -> None:
-        """Attach an opening to the node nearest to it, under its old number or a new one."""
+    def _keep(self, number: int | None, opening: Opening, node_id: int, T_grid_node: Pose) -> None:
+        """Attach an opening to a node, under its old number or a new one."""
         state = OpeningState.OPEN if number is None else self._kept[number].placeholder.state
         if number is None:
             number, self._next_id = self._next_id, self._next_id + 1
-        node_id = min(T_grid_node, key=lambda n: float(np.hypot(*(T_grid_node[n][:2] - opening.p_grid))))
-        x, y, yaw = se2.between(T_grid_node[node_id], [*opening.p_grid, opening.yaw_grid_rad])
+        x, y, yaw = se2.between(T_grid_node, [*opening.p_grid, opening.yaw_grid_rad])
         placeholder = Placeholder(number, node_id, float(x), float(y), float(yaw), opening.size_m, state)
         kept = self._kept.setdefault(number, _Kept(placeholder))
         kept.placeholder = placeholder
@@ -140,8 +142,8 @@ def _point(placeholder: Placeholder) -> tuple[float, float]:
     return placeholder.x_m, placeholder.y_m
 
 
-def _nearest(p_grid: tuple[float, float], places: Mapping[int, np.ndarray]) -> int | None:
-    if not places:
-        return None
-    number = min(places, key=lambda n: float(np.hypot(*(places[n] - p_grid))))
-    return number if np.hypot(*(places[number] - p_grid)) <= SAME_M else None
+def _same(p_grid: tuple[float, float], places: Mapping[int, Pose], ground: Ground) -> int | None:
+    """Return the nearest place that an opening may be; one behind a wall is another one."""
+    away = {number: float(np.hypot(*(place - p_grid))) for number, place in places.items()}
+    near = sorted((number for number in away if away[number] <= SAME_M), key=lambda n: away[n])
+    return next((number for number in near if not ground.walled_off(places[number], p_grid)), None)

@@ -3,6 +3,7 @@
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,15 @@ class Here:
     now_s: float
 
 
-def price_openings(openings: Sequence[Placeholder], here: Here, config: ExploreConfig) -> dict[int, float]:
+class Price(NamedTuple):
+    """What an opening costs."""
+
+    way_m: float
+    direct: bool
+    """It can be reached through the window; else its node is to be reached first."""
+
+
+def price_openings(openings: Sequence[Placeholder], here: Here, config: ExploreConfig) -> dict[int, Price]:
     """Return the price of each opening within reach, by number.
 
     Of those that only the edges lead to just the nearest is priced, and only when none in the window is near.
@@ -37,16 +46,16 @@ def price_openings(openings: Sequence[Placeholder], here: Here, config: ExploreC
     row, col = costs.cell(here.T_grid_base)
     start = np.array([int(row) * costs.state.shape[1] + int(col)], dtype=np.int64)
     field_cells = kernels.march(costs.cost, start, np.zeros(1), -1, 0.0, top_cost(costs))
-    prices: dict[int, float] = {}
+    prices: dict[int, Price] = {}
     away: list[Placeholder] = []
     for opening in openings:
         price_m = _in_window(opening, here, field_cells, config)
         if price_m is None:
             away.append(opening)
         else:
-            prices[opening.placeholder_id] = price_m
-    if away and (not prices or min(prices.values()) > config.window_first_m):
-        prices.update(_by_route(away, here))
+            prices[opening.placeholder_id] = Price(price_m, direct=True)
+    if away and (not prices or min(prices.values()).way_m > config.window_first_m):
+        prices |= {number: Price(way_m, direct=False) for number, way_m in _by_route(away, here).items()}
     return prices
 
 

@@ -1,0 +1,65 @@
+"""What the window shows of the ground: where large patches are unseen, and what is in sight of what."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lemtomap.nav.costmap import Costs
+from lemtomap.nav.explore import kernels
+from lemtomap.se2 import Pose
+
+NEAR_CELLS = 4
+"""Remembered ground is drawn this much too large; new ground begins beyond."""
+JUDGED_M = 0.5
+"""Nearer to the window's border than this nothing is said about an opening."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """One look at the window."""
+
+    costs: Costs
+    large: NDArray[np.uint8]
+    """uint8 (rows, cols), 1 on unseen ground of some depth."""
+
+    @classmethod
+    def of(cls, costs: Costs, seen: NDArray[np.uint8], least_depth_m: float) -> Self:
+        """Return the ground as a window shows it.
+
+        seen: uint8 (rows, cols), 1 where the ground is known or was known once; a patch of unseen ground
+        counts when a square of twice least_depth_m fits into it.
+        """
+        depth = max(1, round(least_depth_m / costs.resolution_m))
+        return cls(costs, np.asarray(kernels.large_unknown(seen, depth)))
+
+    def still_open(self, p_grid: ArrayLike) -> bool:
+        """Tell whether an opening at a place of the window may still lead to unseen ground."""
+        if not self.costs.holds(p_grid, JUDGED_M):
+            return True
+        return bool(
+            kernels.dark_in_sight(self.costs.state, self.large, *self.costs.cell(p_grid), NEAR_CELLS + 2.0)
+        )
+
+    def walled_off(self, p_grid: ArrayLike, q_grid: ArrayLike) -> bool:
+        """Tell whether an obstacle stands between two places."""
+        return self._worst(p_grid, q_grid) == kernels.LETHAL
+
+    def node_in_sight(self, p_grid: ArrayLike, T_grid_node: Mapping[int, Pose], otherwise_id: int) -> int:
+        """Return the nearest node from which a place is seen over known floor, else the one given.
+
+        The nearest of all may stand in the next room.
+        """
+        p = np.asarray(p_grid, dtype=np.float64)[:2]
+        away = {node_id: float(np.hypot(*(T[:2] - p))) for node_id, T in T_grid_node.items()}
+        for node_id in sorted(away, key=lambda n: away[n]):
+            if self._worst(p, T_grid_node[node_id]) == kernels.FREE:
+                return node_id
+        return otherwise_id if otherwise_id in away else min(away, key=lambda n: away[n])
+
+    def _worst(self, p_grid: ArrayLike, q_grid: ArrayLike) -> int:
+        return int(
+            kernels.worst_between(self.costs.state, *self.costs.cell(p_grid), *self.costs.cell(q_grid))
+        )
