@@ -104,7 +104,7 @@ class Explorer:
             self._openings.recall(graph.openings())
         self._recalled = True
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
-        reach = self._look(map_view, T_grid_base)
+        reach = self._look(map_view, T_grid_base, now_s)
         self._judge(navigation, now_s)
         fresh = FreshGraph(graph, map_view, self._nav.route.usual_speed_mps)
         goal = self._choose(Here(map_view, fresh, reach, T_grid_base, now_s))
@@ -115,7 +115,7 @@ class Explorer:
         self._output = ExploreOutput(goal, done, text, *self._lists(), self._openings.take_events())
         return self._output
 
-    def _look(self, map_view: MapView, T_grid_base: Pose) -> Reach:
+    def _look(self, map_view: MapView, T_grid_base: Pose, now_s: float) -> Reach:
         """Find the openings of the window, leave out forgotten ones, and join them with the known."""
         config = self.config
         self._costmap.follow_window(map_view.grid)
@@ -126,7 +126,7 @@ class Explorer:
         seen = self._memory.recall(costs, map_view.T_grid_node)
         ground = Ground.of(costs, seen, config.least_depth_m)
         openings = find_openings(reach, ground, config.least_size_m)
-        self._openings.match(openings, ground, map_view.T_grid_node, map_view.associated_id)
+        self._openings.match(openings, ground, map_view.T_grid_node, map_view.associated_id, now_s)
         return reach
 
     def _judge(self, navigation: NavOutput | None, now_s: float) -> None:
@@ -207,7 +207,13 @@ class Explorer:
     def _text(self, now_s: float, *, done: bool) -> str:
         opened, closed = self._lists()
         if done:
-            return f"explored everything; {len(closed)} openings stayed closed"
+            nodes = ", ".join(str(node_id) for node_id in sorted({p.node_id for p in closed}))
+            left = (
+                f"{len(closed)} openings stayed closed, beside nodes {nodes}"
+                if closed
+                else "none stayed closed"
+            )
+            return f"explored everything; {left}"
         if opened and not self._openings.ready(now_s):
             return f"waiting to try {len(opened)} openings again, {len(closed)} closed"
         return f"{len(opened)} openings to explore, {len(closed)} closed"

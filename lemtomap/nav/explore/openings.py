@@ -24,6 +24,7 @@ class _Kept:
     told: Placeholder | None = None
     failures: int = 0
     not_before_s: float = 0.0
+    reopened: bool = False
 
 
 class Openings:
@@ -69,10 +70,11 @@ class Openings:
         ground: Ground,
         T_grid_node: Mapping[int, Pose],
         here_id: int,
+        now_s: float,
     ) -> None:
         """Join the openings in the window now with those known; drop known ones that turn out explored.
 
-        here_id: the node the robot is at.
+        here_id: the node the robot is at. A closed opening seen within reach later on is tried once more.
         """
         places = {
             number: se2.transform(T_grid_node[kept.placeholder.node_id], _point(kept.placeholder))
@@ -86,13 +88,22 @@ class Openings:
                 del free[number]
             elif _same(opening.p_grid, places, ground) is not None:
                 continue  # a second piece of an opening already matched
-            known_from = here_id if number is None else self._kept[number].placeholder.node_id
+            known_from = here_id
+            if number is not None:
+                self._reopen(self._kept[number], now_s)
+                known_from = self._kept[number].placeholder.node_id
             node_id = ground.node_in_sight(opening.p_grid, T_grid_node, known_from)
             self._keep(number, opening, node_id, T_grid_node[node_id])
         for number, place in free.items():
             kept = self._kept[number]
             if kept.placeholder.state == OpeningState.OPEN and not ground.still_open(place):
                 self.done(number, closed=False)
+
+    def _reopen(self, kept: _Kept, now_s: float) -> None:
+        closed = kept.placeholder.state == OpeningState.CLOSED
+        if closed and not kept.reopened and now_s >= kept.not_before_s:
+            kept.placeholder = replace(kept.placeholder, state=OpeningState.OPEN)
+            kept.reopened, kept.told = True, None
 
     def _keep(self, number: int | None, opening: Opening, node_id: int, T_grid_node: Pose) -> None:
         """Attach an opening to a node, under its old number or a new one."""

@@ -1,0 +1,89 @@
+"""What becomes of one opening: kept, told apart, reached from the right node, tried again, closed."""
+
+import numpy as np
+
+from lemtomap import se2
+from lemtomap.nav import kernels
+from lemtomap.nav.costmap import Costs
+from lemtomap.nav.explore.frontier import Opening
+from lemtomap.nav.explore.ground import Ground
+from lemtomap.nav.explore.openings import Openings
+from lemtomap.topo.events import OpeningDone
+from lemtomap.topo.graph import OpeningState
+
+RES = 0.05
+SIDE_M = 6.0
+
+
+def ground(unknown=(), walls=(), seen=None) -> Ground:
+    """Free floor, 6 x 6 m, with unknown and occupied boxes (x0, y0, x1, y1); seen: ground known once."""
+    state = np.full((round(SIDE_M / RES),) * 2, kernels.FREE, dtype=np.uint8)
+    for boxes, value in ((unknown, kernels.UNKNOWN), (walls, kernels.LETHAL)):
+        for x0, y0, x1, y1 in boxes:
+            state[round(y0 / RES) : round(y1 / RES), round(x0 / RES) : round(x1 / RES)] = value
+    clearance = np.full(state.shape, 9.0, dtype=np.float32)
+    costs = Costs(0.0, RES, (0.0, 0.0), state, clearance, np.ones(state.shape, dtype=np.float32))
+    known = (state != kernels.UNKNOWN) if seen is None else seen
+    return Ground.of(costs, known.astype(np.uint8), 0.2)
+
+
+DARK_ROOM = (4.0, 0.0, 6.0, 6.0)
+EDGE = (3.95, 3.0)
+NODES = {1: se2.pose(2.0, 3.0, 0.0)}
+
+
+def one_opening() -> tuple[Openings, int]:
+    openings = Openings()
+    openings.match([Opening(EDGE, 0.0, 1.0)], ground([DARK_ROOM]), NODES, 1, 0.0)
+    (placeholder,) = openings.of_state(OpeningState.OPEN)
+    return openings, placeholder.placeholder_id
+
+
+def test_is_explored_when_the_ground_behind_it_was_seen():
+    openings, number = one_opening()
+    openings.match([], ground(), NODES, 1, 1.0)
+    assert OpeningDone(number, closed=False) in openings.take_events()
+
+
+def test_is_kept_while_the_window_has_forgotten_the_ground_around_it():
+    openings, number = one_opening()
+    forgotten = ground([(0.0, 0.0, 6.0, 6.0)], seen=np.ones((120, 120), dtype=np.uint8))
+    openings.match([], forgotten, NODES, 1, 1.0)
+    assert openings.get(number) is not None
+
+
+def test_is_explored_when_only_a_wall_hides_the_dark():
+    openings, number = one_opening()
+    openings.match([], ground([(4.1, 0.0, 6.0, 6.0)], [(4.0, 0.0, 4.1, 6.0)]), NODES, 1, 1.0)
+    assert openings.get(number) is None
+
+
+def test_one_behind_a_wall_is_another_one():
+    openings, _ = one_opening()
+    beyond = Opening((4.4, 3.0), 0.0, 1.0)
+    openings.match([beyond], ground([(5.0, 0.0, 6.0, 6.0)], [(4.1, 0.0, 4.2, 6.0)]), NODES, 1, 1.0)
+    assert beyond.p_grid in {(p.x_m + 2.0, p.y_m + 3.0) for p in openings.of_state(OpeningState.OPEN)}
+    assert len(openings.take_events()) >= 2
+
+
+def test_belongs_to_the_node_that_sees_it_not_to_the_nearest():
+    walls = [(0.0, 3.5, 6.0, 3.6)]
+    nodes = NODES | {2: se2.pose(3.9, 3.9, 0.0)}
+    openings = Openings()
+    openings.match([Opening(EDGE, 0.0, 1.0)], ground([DARK_ROOM], walls), nodes, 2, 0.0)
+    assert openings.of_state(OpeningState.OPEN)[0].node_id == 1
+
+
+def test_a_failed_one_waits_and_a_closed_one_in_reach_gets_one_more_chance():
+    openings, number = one_opening()
+    again = [Opening(EDGE, 0.0, 1.0)]
+    openings.failed(number, 10.0, pause_s=60.0, attempts=2)
+    assert openings.ready(69.0) == []
+    assert len(openings.ready(70.0)) == 1
+    for end_s, expected in ((70.0, 1), (200.0, 0)):
+        openings.failed(number, end_s, pause_s=60.0, attempts=2)
+        assert len(openings.of_state(OpeningState.CLOSED)) == 1
+        openings.match(again, ground([DARK_ROOM]), NODES, 1, end_s + 1.0)
+        assert openings.ready(end_s + 1.0) == []
+        openings.match(again, ground([DARK_ROOM]), NODES, 1, end_s + 61.0)
+        assert len(openings.ready(end_s + 61.0)) == expected
