@@ -59,6 +59,8 @@ class _Pursuit:
     arrived_s: float | None = None
     facing: bool = False
     """Having arrived, the robot was told to look into the opening."""
+    pressing: bool = False
+    """It has been at the node from which the opening was seen: on over whatever floor lies between."""
 
     @property
     def direct(self) -> bool:
@@ -145,10 +147,7 @@ class Explorer:
         elif navigation.state == NavState.ARRIVED:
             pursuit.arrived_s = now_s if pursuit.arrived_s is None else pursuit.arrived_s
             if pursuit.facing and now_s - pursuit.arrived_s > self.config.linger_s:
-                if pursuit.direct:
-                    self._openings.spend(pursuit.number)
-                else:
-                    self._give_up(pursuit.number, now_s)
+                self._openings.spend(pursuit.number)
                 self._pursuit = None
 
     def _give_up(self, number: int, now_s: float) -> None:
@@ -160,9 +159,9 @@ class Explorer:
         ready = self._openings.ready(here.now_s)
         prices = price_openings(ready, here, self.config) if ready else {}
         if pursuit is not None and pursuit.arrived_s is not None:
-            price = prices.get(pursuit.number)
-            if pursuit.direct or price is None or not price.direct:
+            if pursuit.direct:
                 return self._face(pursuit, here.now_s)
+            pursuit.pressing = True
         if not prices:
             for placeholder in ready:
                 self._give_up(placeholder.placeholder_id, here.now_s)
@@ -181,24 +180,28 @@ class Explorer:
         if pursuit.facing or opening is None:
             return None
         pursuit.facing, pursuit.arrived_s, pursuit.told_s = True, None, now_s
-        yaw_rad = opening.yaw_rad if pursuit.direct else float(np.arctan2(opening.y_m, opening.x_m))
-        return replace(pursuit.goal, yaw_node_rad=yaw_rad, tolerance_m=2.0 * self.config.goal_tolerance_m)
+        return replace(
+            pursuit.goal, yaw_node_rad=opening.yaw_rad, tolerance_m=2.0 * self.config.goal_tolerance_m
+        )
 
     def _pursue(self, opening: Placeholder, price: Price, now_s: float) -> Goal | None:
         """Return the goal at an opening if the navigator is not on its way there already.
 
         Where unseen floor lies before the opening, because the window forgot it, the robot goes to the node
-        from which it was seen.
+        from which it was seen, and on from there.
         """
-        place = (opening.x_m, opening.y_m) if price.direct else AT_NODE
+        pursuit = self._pursuit if self._is_pursued(opening) else None
+        pressing = pursuit is not None and pursuit.pressing
+        place = (opening.x_m, opening.y_m) if price.direct or pressing else AT_NODE
         goal = Goal(opening.node_id, place, None, self.config.goal_tolerance_m)
-        pursuit = self._pursuit
-        same = pursuit is not None and pursuit.number == opening.placeholder_id
-        if pursuit is not None and same and _same_place(pursuit.goal, goal):
+        if pursuit is not None and _same_place(pursuit.goal, goal):
             return None
         until_s = now_s + self.config.patience_s + price.way_m / self.config.slow_mps
-        self._pursuit = _Pursuit(opening.placeholder_id, goal, until_s, now_s)
+        self._pursuit = _Pursuit(opening.placeholder_id, goal, until_s, now_s, pressing=pressing)
         return goal
+
+    def _is_pursued(self, opening: Placeholder) -> bool:
+        return self._pursuit is not None and self._pursuit.number == opening.placeholder_id
 
     def _lists(self) -> tuple[tuple[Placeholder, ...], tuple[Placeholder, ...]]:
         state = self._openings.of_state
