@@ -2,6 +2,7 @@
 
 import math
 from datetime import UTC, datetime
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -28,6 +29,13 @@ Duration = Annotated[
 ]
 
 
+class Nav(StrEnum):
+    """What plans the way in a simulated building."""
+
+    TOPOLOGICAL = "topological"
+    METRIC = "metric"
+
+
 def register(app: typer.Typer) -> None:
     """Add this module's commands to the program, in the order of the help page."""
     add(
@@ -37,6 +45,7 @@ def register(app: typer.Typer) -> None:
         "lemtomap sim --fast --mission goto:12               lock-step: explore, then go there",
         "lemtomap sim --map office.lemto --mission goto:12   find its place in that map, then go",
         "lemtomap sim --world plan.yaml --duration 600       any ROS map_server floor plan",
+        "lemtomap sim --fast --nav metric --mission goto:13:3    the metric baseline, to a point of the plan",
         "lemtomap sim --serve                                only the fake hardware, on two pseudo-terminals",
     )
     add(
@@ -92,6 +101,12 @@ def sim(
     serve: Annotated[bool, typer.Option("--serve", help="only the fake hardware, until interrupted")] = False,
     seed: Annotated[int, typer.Option(metavar="N", help="of noise in the world and of the particles")] = 0,
     map_file: MapFile = None,
+    depth: Annotated[
+        bool, typer.Option("--depth", help="carry a depth camera, which sees what the laser overlooks")
+    ] = False,
+    nav: Annotated[
+        Nav, typer.Option(help="metric: the baseline, AMCL and a planner over the whole plan; goto:X:Y")
+    ] = Nav.TOPOLOGICAL,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="folder for the results; an earlier run's are replaced")
     ] = Path("runs/sim"),
@@ -109,7 +124,16 @@ def sim(
     from robot.sim_run import SimOptions, run_sim
     from robot.told import told_after_run
 
-    options = SimOptions(world, mission, duration, out, seed, fast=fast, gui=gui, map_path=map_file)
+    options = SimOptions(
+        world, mission, duration, out, seed, fast=fast, gui=gui, map_path=map_file, depth=depth
+    )
+    if nav is Nav.METRIC:
+        from robot.metric_run import run_metric, told_after_metric
+
+        with progress_bar(f"sim {world}, metric") as bar:
+            summary = run_metric(options, bar)
+        typer.echo(told_after_metric(summary))
+        raise typer.Exit(summary["result"] == "failed")
     with progress_bar(f"sim {world}") as bar:
         summary = run_sim(options, bar)
     typer.echo(told_after_run(out, summary))

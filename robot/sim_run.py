@@ -5,9 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from drivers.port import open_serial
+from lemtomap.errors import BadSetting
 from lemtomap.grid import DEFAULT_SLAM
 from lemtomap.topo.reader import TopoReader
 from robot.config import RobotConfig
+from robot.core import RobotCore
+from robot.depth import DepthFeed
 from robot.display import has_display
 from robot.exchange import Ended, MissionState
 from robot.lockstep import run_lockstep
@@ -39,6 +42,8 @@ class SimOptions:
     live: bool = True
     map_path: Path | None = None
     """A map to go on with, wherever in it the robot stands; None: a new one."""
+    depth: bool = False
+    """Carry the simulated depth camera, too."""
 
 
 def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
@@ -51,6 +56,8 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
         options.mission.startswith("goto:") and options.map_path is None
     ):  # the map is empty: see the building first
         options = replace(options, mission=f"explore,{options.mission}")
+    if options.depth and not options.fast:
+        raise BadSetting("--depth: the simulated camera has no cable in real time; add --fast")
     plan = RunPlan(
         out=options.out,
         map_path=options.map_path or options.out / "map.lemto",
@@ -77,9 +84,12 @@ def _drive_fast(options: SimOptions, run: Run) -> None:
     simulator = Simulator(worlds.load(options.world), options.seed, gui=options.gui)
     run.files.show_world(outlines(simulator.world), lambda: simulator.truth().T_world_base)
     look_at_s = 0.0
+    camera = camera_of(simulator, run.core) if options.depth else None
 
     def watch(now_s: float) -> None:
         nonlocal look_at_s
+        if camera is not None:
+            camera.poll(now_s)
         if now_s >= look_at_s:
             look_at_s = now_s + LOOK_PERIOD_S
             run.files.look(now_s)
@@ -87,14 +97,19 @@ def _drive_fast(options: SimOptions, run: Run) -> None:
     try:
         mission = parse_mission(options.mission)
         ended = run_lockstep(simulator, run.core, mission, options.duration_s, run.files.raw.put, watch)
-        run.end(ended, _truth(simulator))
+        run.end(ended, truth_of(simulator))
     except KeyboardInterrupt:
-        run.end(Ended(simulator.now_s, MissionState.FAILED, "interrupted"), _truth(simulator))
+        run.end(Ended(simulator.now_s, MissionState.FAILED, "interrupted"), truth_of(simulator))
     finally:
         simulator.close()
 
 
-def _truth(simulator: Simulator) -> dict[str, Any]:
+def camera_of(simulator: Simulator, core: RobotCore) -> DepthFeed:
+    """Return the simulated depth camera as the robot takes it."""
+    return DepthFeed(lambda: simulator.camera.points_base(simulator.depth_image()), core.exchange)
+
+
+def truth_of(simulator: Simulator) -> dict[str, Any]:
     """Return what only the simulator knows of how it went."""
     truth = simulator.truth()
     return {"contacts": truth.contact_count, "contact_s": truth.contact_s, "true_path_m": truth.path_m}

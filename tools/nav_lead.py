@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.se2 import Pose
-from lemtomap.types import GridView, Twist
+from lemtomap.types import Twist
 from robot.build import build_core
 from robot.config import RobotConfig
 from robot.core import RobotCore
@@ -23,6 +23,7 @@ from robot.depth import DepthFeed
 from robot.exchange import Ended, MissionState
 from robot.lockstep import run_lockstep
 from robot.missions import Mission, Moment, Order
+from robot.sim_run import camera_of
 from sim.route import RoutePlanner
 from sim.simulator import Simulator
 from sim.tours import Tour
@@ -105,12 +106,6 @@ def rig_of(world: World, seed: int, folder: Path, *, depth: bool = False) -> Rig
     return rig
 
 
-def camera_of(simulator: Simulator, core: RobotCore) -> DepthFeed:
-    """Return the simulated depth camera as the robot takes it."""
-    camera = simulator.camera
-    return DepthFeed(lambda: camera.points_base(simulator.depth_image()), core.exchange)
-
-
 def round_trip(world: World, spacing_m: float = PLACES_M) -> NDArray[np.float64]:
     """Return a path through every place of a building, nearest first by the way, and back to the start."""
     planner = RoutePlanner(world.raster)
@@ -125,13 +120,6 @@ def round_trip(world: World, spacing_m: float = PLACES_M) -> NDArray[np.float64]
         here = goal
     legs.append(planner.path(here, home))
     return np.concatenate(legs)
-
-
-def grid_of(world: World) -> GridView:
-    """Return the true plan of a building as a saved grid: the best map a metric planner could have."""
-    raster = world.raster
-    occupancy = np.where(raster.occupied, 100, np.where(raster.free, 0, -1)).astype(np.int8)
-    return GridView(0.0, np.ascontiguousarray(occupancy), raster.resolution_m, raster.origin_m)
 
 
 class Meter:

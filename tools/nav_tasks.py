@@ -20,13 +20,14 @@ from robot.config import RobotConfig
 from robot.core import RobotCore
 from robot.exchange import MissionState
 from robot.metric import build_metric_core
+from robot.metric_run import grid_of
 from robot.missions import Moment, Order
 from robot.warmup import warm_up
 from sim import worlds
 from sim.simulator import Simulator
 from sim.tours import plan_errand
 from sim.world import World
-from tools.nav_lead import Meter, Rig, grid_of, rig_of
+from tools.nav_lead import Meter, Rig, rig_of
 
 KINDS = ("topological", "metric")
 LEG_LIMIT_S = 900.0
