@@ -240,8 +240,9 @@ class Navigator:
     # ---- driving ----
 
     def _drive(self, route: Route, plan: MetricPlan, target: Target, moment: Moment) -> NavOutput:
-        end_m = self._way_to_end(plan, moment.T_grid_base) if target.final else None
-        if end_m is not None and self._follower.at_goal(end_m, self._tolerance_m()):
+        last = target.final or (target.node_id == route.nodes[-1] and target.beyond_m == 0.0)
+        end_m = self._way_to_end(plan, moment.T_grid_base) if last else None
+        if end_m is not None and target.final and self._follower.at_goal(end_m, self._tolerance_m()):
             step = self._follower.halt(moment.T_grid_base, moment.twist, self._goal_yaw(route, moment))
             if step.motion == Motion.THERE:
                 self._finish(NavState.ARRIVED, Reason.NONE, f"arrived at node {route.nodes[-1]}")

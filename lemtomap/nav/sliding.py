@@ -177,14 +177,13 @@ def _target_at(
     if place is None:
         return None
     final = index == len(route.nodes) - 1
-    border_m = 0.0 if final else BORDER_M
-    if not reach.costs.holds(place, border_m):
-        return None
-    exact = final and goal.p_node != (0.0, 0.0)
-    found = reach.nearest(place, goal_tolerance_m if exact else max(SNAP_M, goal_tolerance_m))
-    if found is None and final and goal.p_node != (0.0, 0.0):  # go to its node and look from there
-        final = False
-        found = reach.nearest(T_grid_node[route.nodes[index]], SNAP_M)
+    found = None
+    if reach.costs.holds(place, 0.0 if final else BORDER_M):
+        found = reach.nearest(place, max(SNAP_M, goal_tolerance_m))
+    T_grid_node_here = T_grid_node[route.nodes[index]]
+    if found is None and final and goal.p_node != (0.0, 0.0) and reach.costs.holds(T_grid_node_here):
+        final = False  # go to its node and look from there
+        found = reach.nearest(T_grid_node_here, SNAP_M)
     if found is None:
         return None
     return Target(index, route.nodes[index], found[:2], final, found[2] == 1)

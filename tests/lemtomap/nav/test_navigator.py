@@ -84,3 +84,12 @@ def test_takes_the_next_goal_after_a_failure():
     navigator = Navigator()
     assert run(world, navigator, 77, 5.0)[-1].state == NavState.FAILED
     assert run(world, navigator, 3, 30.0)[-1].state == NavState.ARRIVED
+
+
+def test_refuses_a_point_out_of_reach_soon_after_it_came_to_its_node():
+    world = two_rooms()
+    outputs = run(world, Navigator(), Goal(5, (0.4, -1.3)), 60.0)
+    assert outputs[-1].state == NavState.FAILED
+    assert outputs[-1].reason == Reason.BLOCKED
+    assert "out of reach" in outputs[-1].text
+    assert len(outputs) * 0.1 < 5.2 / 0.5 + 12.0
