@@ -4,6 +4,7 @@ LEMTOMap is made of four (metric mapping, topological mapping, metric navigation
 baseline of two. While a drive is mapped nobody navigates: navigation keeps its costmaps, as move_base did.
 """
 
+import shutil
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -40,7 +41,7 @@ class Part(ABC):
 
     @abstractmethod
     def begin(self, *, known: bool = False) -> None:
-        """Start; memory from here on is the subsystem's own. `known`: keep the map file that is there."""
+        """Start; memory from here on is the subsystem's own. `known`: go on with the map made before."""
 
     @abstractmethod
     def take(self, frame: Frame) -> None:
@@ -97,9 +98,12 @@ class TopologicalMapping(Part):
         from lemtomap.topo.store import TopoStore  # noqa: PLC0415
 
         path = self.options.out / "map.lemto"
-        for old in () if known else self.options.out.glob("map.lemto*"):
-            old.unlink()
-        store = TopoStore.open(path, durable=False) if known else TopoStore.create(path, durable=False)
+        if known:  # topological navigation still reads the first one
+            path = Path(shutil.copy(path, path.with_stem("known")))
+        else:
+            for old in self.options.out.glob("*.lemto*"):
+                old.unlink()
+        store = (TopoStore.open if known else TopoStore.create)(path, durable=False)
         self._mapper = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
         self._grid: GridView | None = None
         self._node_id = 0
