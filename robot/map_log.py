@@ -28,6 +28,7 @@ from robot.progress import Bar, first_use
 PARTICLES = {"window": 1, "gmapping": 30}  # growing grid: what Grisetti et al. 2007 used on these logs
 BAR_PERIOD_S = 0.2
 PROFILE_ROWS = 200
+MOST_REMARKS = 5
 FIRST_SCANS = 50  # by then every kernel has run
 
 
@@ -97,8 +98,10 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
     begun_s, begun_cpu_s = time.perf_counter(), time.process_time()
     config = options.slam_config()
     log = open_log(options.log)
-    for remark in log.remarks[:3]:
+    for remark in log.remarks[:MOST_REMARKS]:
         bar.say(f"{log.path}: {remark}")
+    if len(log.remarks) > MOST_REMARKS:
+        bar.say(f"{log.path}: and {len(log.remarks) - MOST_REMARKS} more of that kind")
     read_cpu_s = time.process_time() - begun_cpu_s
     with outputs.staged(options.out) as stage:
         grid = SLAMS[options.slam](config, options.seed)

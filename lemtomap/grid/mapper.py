@@ -167,16 +167,28 @@ class Tracker(ABC):
         uncertainty = self._trust.widen(expected)
         leapt = turn_rad > config.large_turn_rad
         match = self._match(beams, predicted, uncertainty, window, config.search_rad if leapt else 0.0)
-        if match.quality < config.collapse_share * self._usual_quality and not leapt:
-            slipped = Uncertainty(config.search_m, config.search_rad)
-            rival = self._match(beams, predicted, slipped, window, config.search_rad)
-            sees_all_ways = rival.diversity >= config.degenerate_below  # a lone wall fits any other
-            if sees_all_ways and rival.quality > match.quality + config.rival_gain:
-                match = rival
+        if match.quality < config.collapse_share * self._usual_quality:
+            match = self._look_round(beams, match, predicted, leapt=leapt)
         elif match.accepted and math.hypot(self._pending[0], self._pending[1]) > config.match_distance_m:
             change = match.T_grid_base - predicted
             self._trust.learn(change, float(predicted[2]), match.information, expected)
         self._usual_quality += config.quality_memory * (match.quality - self._usual_quality)
+        return match
+
+    def _look_round(self, beams: Beams, match: Match, predicted: Pose, *, leapt: bool) -> Match:
+        """Return a clearly better match than one that fits badly: the wheels slipped, or odometry leapt and
+        the robot stayed.
+        """
+        assert self._T_grid_base is not None  # noqa: S101
+        config = self.config
+        slipped = Uncertainty(config.search_m, config.search_rad)
+        starts = [] if leapt else [predicted]
+        if math.hypot(self._pending[0], self._pending[1]) > config.search_m:
+            starts.append(self._T_grid_base)
+        for start in starts:
+            rival = self._match(beams, start, slipped, self._window(), config.search_rad)
+            if rival.quality > match.quality + config.rival_gain:
+                match = rival
         return match
 
     def _step_covariance(self, T_grid_base: Pose) -> NDArray[np.float64]:

@@ -9,7 +9,6 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,22 +17,18 @@ from numpy.typing import NDArray
 from lemtomap import se2
 from lemtomap.errors import BadLog
 from lemtomap.types import Odometry, Scan
-from robot.logs.numbers import finite
+from robot.logs.numbers import finite, readings
+from robot.logs.oddities import Record, oddities
 
 TAIL_FIELDS = 9  # laser pose, robot pose, stamp, host, logger stamp
 PILE_WIDTH_M = (
     0.12  # a SICK's no-return code scatters this far below its most frequent value (unit conversions)
 )
 PILE_BEAMS = 5  # a code comes from beams of many directions, a real surface at one distance does not
-TELEPORT_M, TELEPORT_RAD = 1.0, 0.7  # more than a wheeled robot does between two scans
 
 
 @dataclass(frozen=True, slots=True)
-class _Record:
-    line_number: int
-    stamp_s: float
-    ranges_m: NDArray[np.float32]
-    T_odom_base: NDArray[np.float64]
+class _Record(Record):
     T_base_laser: NDArray[np.float64]
 
 
@@ -43,7 +38,7 @@ class CarmenLog:
     def __init__(self, path: Path, records: list[_Record]) -> None:
         self.path = path
         self.no_return_m = infer_no_return_m([record.ranges_m for record in records])
-        self.remarks = _remarks(records)
+        self.remarks = oddities(records)
         self._records = records
 
     def __len__(self) -> int:
@@ -84,7 +79,8 @@ def infer_no_return_m(scans: list[NDArray[np.float32]]) -> float:
     A laser writes a fixed code, its largest reading, for a beam that does not come back. The code shows as
     a pile of equal readings at the top of the log that comes from many directions.
     """
-    largest_m = max((float(ranges.max()) for ranges in scans if len(ranges)), default=0.0)
+    seen = (ranges[~np.isnan(ranges)] for ranges in scans)
+    largest_m = max((float(ranges.max()) for ranges in seen if len(ranges)), default=0.0)
     counts: Counter[int] = Counter()
     beams: dict[int, set[int]] = {}
     for ranges in scans:
@@ -114,26 +110,8 @@ def _record(path: Path, number: int, line: str) -> _Record:
         )
         raise BadLog(f"{path}:{number}: cut in the middle of the line? {reason}")
     tail = fields[2 + count : 2 + count + TAIL_FIELDS]
-    ranges = np.array(finite(path, number, fields[2 : 2 + count]), dtype=np.float32)
+    ranges = np.array(readings(path, number, fields[2 : 2 + count]), dtype=np.float32)
     numbers = finite(path, number, tail[:7])
     laser, robot = np.array(numbers[:3]), np.array(numbers[3:6])
-    return _Record(number, numbers[6], ranges, robot, se2.between(robot, laser))
-
-
-def _remarks(records: list[_Record]) -> list[str]:
-    remarks = []
-    for before, here in pairwise(records):
-        if len(before.ranges_m) != len(here.ranges_m):
-            remarks.append(
-                f"line {here.line_number}: {len(here.ranges_m)} beams after {len(before.ranges_m)}"
-            )
-        x, y, yaw = np.abs(se2.between(before.T_odom_base, here.T_odom_base))
-        if math.hypot(x, y) > TELEPORT_M or yaw > TELEPORT_RAD:
-            leap = f"{math.hypot(x, y):.2f} m, {math.degrees(yaw):.0f} degrees"
-            remarks.append(f"line {here.line_number}: odometry leaps by {leap}")
-    back = [here.line_number for before, here in pairwise(records) if here.stamp_s < before.stamp_s]
-    if back:
-        remarks.append(
-            f"line {back[0]} and {len(back) - 1} more: the stamp goes back; lines are used in file order"
-        )
-    return remarks
+    missing = int(np.isnan(ranges).sum())
+    return _Record(number, numbers[6], ranges, robot, missing, se2.between(robot, laser))

@@ -20,6 +20,17 @@ def finite(path: Path, line_number: int, texts: Sequence[str]) -> list[float]:
     return values
 
 
+def readings(path: Path, line_number: int, texts: Sequence[str]) -> list[float]:
+    """Return the texts as floats, NaN where one is not finite: a reading less does no harm. Raises BadLog
+    where text stands.
+    """
+    try:
+        values = list(map(float, texts))
+    except ValueError:
+        return finite(path, line_number, texts)
+    return [value if math.isfinite(value) else math.nan for value in values]
+
+
 def _is_number(text: str) -> bool:
     try:
         float(text)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from lemtomap import se2
 from lemtomap.errors import BadLog
 from lemtomap.types import Odometry, Scan
-from robot.logs.numbers import finite
+from robot.logs.numbers import finite, readings
+from robot.logs.oddities import Record, oddities
 
 FIELDS = 706
 FIRST_RANGE, RANGES = 24, 682
@@ -31,10 +32,7 @@ ANGLE_MIN_RAD = -(RANGES - 1) / 2.0 * ANGLE_STEP_RAD
 
 
 @dataclass(frozen=True, slots=True)
-class _Record:
-    stamp_s: float
-    ranges_m: NDArray[np.float32]
-    T_odom_base: NDArray[np.float64]
+class _Record(Record):
     v_mps: float
     w_radps: float
     """Mean velocity since the scan before; the rover drives up to 0.9 m/s, so a scan must be de-skewed."""
@@ -45,7 +43,7 @@ class TinySlamLog:
 
     def __init__(self, path: Path, records: list[_Record]) -> None:
         self.path = path
-        self.remarks: list[str] = []
+        self.remarks = oddities(records)
         self._records = records
 
     def __len__(self) -> int:
@@ -69,7 +67,7 @@ def read(path: Path, lines: list[str]) -> TinySlamLog:
             raise BadLog(f"{path}:{number}: cut in the middle of the line? {len(fields)} fields of {FIELDS}")
         stamp_s = finite(path, number, fields[:1])[0] / 1e6
         left, right = finite(path, number, fields[2:4])
-        millimetres = np.array(finite(path, number, fields[FIRST_RANGE : FIRST_RANGE + RANGES]))
+        millimetres = np.array(readings(path, number, fields[FIRST_RANGE : FIRST_RANGE + RANGES]))
         if ticks_before is not None:
             step = _wheel_step(left - ticks_before[0], right - ticks_before[1])
             T_odom_base = se2.compose(T_odom_base, step)
@@ -77,7 +75,8 @@ def read(path: Path, lines: list[str]) -> TinySlamLog:
         since_s = max(stamp_s - records[-1].stamp_s, TURN_S / 2.0) if records else TURN_S
         ranges = np.where(millimetres < FIRST_ERROR_FREE_MM, np.nan, millimetres / 1000.0).astype(np.float32)
         v_mps, w_radps = float(step[0]) / since_s, float(step[2]) / since_s
-        records.append(_Record(stamp_s, ranges, T_odom_base, v_mps, w_radps))
+        missing = int(np.isnan(millimetres).sum())
+        records.append(_Record(number, stamp_s, ranges, T_odom_base, missing, v_mps, w_radps))
     return TinySlamLog(path, records)
 
 

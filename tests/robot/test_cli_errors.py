@@ -42,7 +42,7 @@ def write(path: Path, content: str | bytes) -> Path:
 BAD_LOGS = {
     "empty.clf": ("", "empty"),
     "cut.clf": (SOUND[:-200], ":3: .*cut"),
-    "nan.clf": (SOUND.replace("2.5", "nan", 1), ":1: 'nan' is not a finite number"),
+    "nan.clf": (SOUND.replace(" 0 0 0 0 ", " 0 0 0 nan ", 1), ":1: 'nan' is not a finite number"),
     "text.clf": (SOUND.replace("2.5", "2.5m", 1), ":1: '2.5m' stands where a number belongs"),
     "foreign.clf": ("# a poem\nnothing of ours\n", "no FLASER line"),
     "cut.dat": (DAT + DAT[:-300], ":2: .*cut"),

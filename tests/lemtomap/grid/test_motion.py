@@ -58,3 +58,15 @@ def test_the_direction_across_a_surface_is_the_twin_s():
     assert np.cos(2.0 * (beams.normals_rad - wanted))[seen] == pytest.approx(1.0, abs=1e-6)
     off_axis = np.abs(np.sin(2.0 * (beams.normals_rad[seen] + pose[2])))
     assert np.quantile(off_axis, 0.9) < 0.02  # all walls are parallel to an axis; at a corner it may slant
+
+
+@pytest.mark.parametrize("leap", [(5.0, 0.0, 0.0), (-3.0, 4.0, 1.5), (40.0, 0.0, 0.0)])
+def test_odometry_that_teleports_is_not_followed_where_the_scan_fits_the_old_place(leap):
+    slam, path = WindowMatcher(SlamConfig()), [(x, 0.0, 0.1) for x in np.arange(-2.0, 0.5, 0.04)]
+    for index, (truth, odometry, scan) in enumerate(drive(path, ROOM, odometry_noise=0.0)):
+        T_odom_base = odometry.T_odom_base
+        if index >= 30:
+            T_odom_base = se2.compose(np.array(leap), T_odom_base)
+        update = slam.update(scan, Odometry(scan.stamp_s, T_odom_base))
+        error = se2.between(truth, update.T_grid_base)
+        assert np.hypot(error[0], error[1]) < 0.05
