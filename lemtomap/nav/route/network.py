@@ -36,9 +36,16 @@ class RouteNetwork:
         self._length_m = np.zeros(_room(count), dtype=np.float32)
         self._time_s = np.zeros(_room(count), dtype=np.float32)
         self._open_price = np.full(_room(count), np.inf, dtype=np.float32)
-        self._blocked_s = np.zeros(_room(count))
+        self._price = np.full(_room(count), np.inf, dtype=np.float32)
+        """As open prices, but inf where closed: kept up to date, for there may be millions."""
         self._chained = np.zeros(_room(count), dtype=bool)
-        self._price = np.empty(0, dtype=np.float32)
+        self._blocked_s: dict[int, float] = {}
+        """Edges the map holds closed, and until when."""
+        self._closed: set[int] = set()
+        """Edges that are inf in the prices now."""
+        self._fallen = False
+        """True: some price has fallen since the tree of ways was made."""
+        self._reached = np.empty(0, dtype=np.float32)
         self._goal_id = -1
         self._to_go = np.empty(0, dtype=np.float32)
         self._via = np.empty(0, dtype=np.int32)
@@ -55,7 +62,11 @@ class RouteNetwork:
         share, usual_mps = self._config.learnt_weight, self._config.usual_speed_mps
         price = share * edges.time_s + (1.0 - share) * edges.length_m / usual_mps
         self._length_m[ids], self._time_s[ids] = edges.length_m, edges.time_s
-        self._open_price[ids], self._blocked_s[ids] = np.maximum(price, 1e-3), edges.blocked_until_s
+        self._open_price[ids] = np.maximum(price, 1e-3)
+        self._note_blocked(edges)
+        open_now = ids[~np.isin(ids, list(self._closed))] if self._closed else ids
+        self._fallen |= bool((self._open_price[open_now] < FALLEN * self._price[open_now]).any())
+        self._price[open_now] = self._open_price[open_now]
         kernels.chain_arcs(
             edges.source_id[new].astype(np.int32),
             edges.target_id[new].astype(np.int32),
@@ -68,6 +79,15 @@ class RouteNetwork:
         if new.any():
             self._goal_id = -1  # a shorter way may have appeared
 
+    def _note_blocked(self, edges: EdgeTable) -> None:
+        """Take over which of these edges the map holds closed."""
+        shut = edges.blocked_until_s > 0.0
+        if self._blocked_s:
+            for edge_id in self._blocked_s.keys() & set(edges.edge_id[~shut].tolist()):
+                del self._blocked_s[edge_id]
+        pairs = zip(edges.edge_id[shut].tolist(), edges.blocked_until_s[shut].tolist(), strict=True)
+        self._blocked_s.update(pairs)
+
     def renew(self, node_ids: Iterable[int], edges: EdgeTable) -> None:
         """Take over all edges that changed nodes have now; those they no longer have are gone for good."""
         still = set(edges.edge_id.tolist())
@@ -75,7 +95,8 @@ class RouteNetwork:
             arc = int(self._first_arc[node_id]) if node_id < self._first_arc.size else -1
             while arc >= 0:
                 if arc >> 1 not in still:
-                    self._open_price[arc >> 1] = np.inf
+                    self._open_price[arc >> 1] = self._price[arc >> 1] = np.inf
+                    self._blocked_s.pop(arc >> 1, None)
                 arc = int(self._next_arc[arc])
         self.put(edges)
 
@@ -94,53 +115,61 @@ class RouteNetwork:
                 raise NoRoute(f"{role} node {node_id} is not in the map")
         if start_id == goal_id:
             return Route((start_id,), (), 0.0)
-        price = self._prices(now_s, closed_until_s or {})
-        fallen = self._goal_id == goal_id and bool((price < FALLEN * self._price).any())
-        if goal_id != self._goal_id or fallen:
-            return self._plan_anew(start_id, goal_id, price)
-        self._price = price
-        return self._plan_around(start_id, goal_id, price)
+        self._close(now_s, closed_until_s or {})
+        if goal_id != self._goal_id or self._fallen:
+            return self._plan_anew(start_id, goal_id)
+        return self._plan_around(start_id, goal_id)
 
-    def _prices(self, now_s: float, closed_until_s: Mapping[int, float]) -> NDArray[np.float32]:
-        price = np.where(self._blocked_s > now_s, np.float32(np.inf), self._open_price)
+    def _close(self, now_s: float, closed_until_s: Mapping[int, float]) -> None:
+        """Bring the prices up to which edges are closed now."""
+        wanted = {edge_id for edge_id, until_s in self._blocked_s.items() if until_s > now_s}
         for edge_id, until_s in closed_until_s.items():
-            if until_s > now_s and edge_id < price.size:
-                price[edge_id] = np.inf
-        return price
+            if until_s > now_s and edge_id < self._price.size:
+                wanted.add(edge_id)
+        for edge_id in wanted - self._closed:
+            self._price[edge_id] = np.inf
+        for edge_id in self._closed - wanted:
+            self._price[edge_id] = self._open_price[edge_id]
+            self._fallen = True
+        self._closed = wanted
 
-    def _plan_anew(self, start_id: int, goal_id: int, price: NDArray[np.float32]) -> Route:
+    def _plan_anew(self, start_id: int, goal_id: int) -> Route:
         self._to_go = np.full(self._first_arc.size, np.inf, dtype=np.float32)
         self._via = np.full(self._first_arc.size, -1, dtype=np.int32)
-        self._goal_id, self._price = goal_id, price
+        self._goal_id, self._fallen = goal_id, False
         self._final_s = kernels.way_to_goal(
-            self._first_arc, self._next_arc, self._arc_to, price, goal_id, start_id,
+            self._first_arc, self._next_arc, self._arc_to, self._price, goal_id, start_id,
             self._config.bucket_s, self._to_go, self._via,
         )  # fmt: skip
         if not np.isfinite(self._to_go[start_id]):
             self._goal_id = -1
-            raise self._no_route(start_id, goal_id, price)
+            raise self._no_route(start_id, goal_id)
         arcs, node_id = [], start_id
         while node_id != goal_id:
             arcs.append(int(self._via[node_id]))
             node_id = int(self._arc_to[arcs[-1]])
         return self._route(start_id, arcs, float(self._to_go[start_id]))
 
-    def _plan_around(self, start_id: int, goal_id: int, price: NDArray[np.float32]) -> Route:
+    def _plan_around(self, start_id: int, goal_id: int) -> Route:
         size = self._first_arc.size
-        reached = np.full(size, np.inf, dtype=np.float32)
+        if self._reached.size != size:
+            self._reached = np.full(size, np.inf, dtype=np.float32)
+        reached = self._reached
         came = np.empty(size, dtype=np.int32)
         touched = np.empty(size, dtype=np.int32)
         count = kernels.guided_way(
-            self._first_arc, self._next_arc, self._arc_to, price, start_id, goal_id,
+            self._first_arc, self._next_arc, self._arc_to, self._price, start_id, goal_id,
             self._to_go, self._final_s, reached, came, touched,
         )  # fmt: skip
+        cost_s = float(reached[goal_id])
+        reached[touched[: abs(count)]] = np.inf  # as it was found
         if count < 0:
-            raise self._no_route(start_id, goal_id, price)
+            raise self._no_route(start_id, goal_id)
         arcs, node_id = [], goal_id
         while node_id != start_id:
             arcs.append(int(came[node_id]))
             node_id = int(self._arc_to[arcs[-1] ^ 1])
-        return self._route(start_id, arcs[::-1], float(reached[goal_id]))
+        return self._route(start_id, arcs[::-1], cost_s)
 
     def _route(self, start_id: int, arcs: list[int], cost_s: float) -> Route:
         nodes = (start_id, *(int(self._arc_to[arc]) for arc in arcs))
@@ -150,14 +179,14 @@ class RouteNetwork:
                 int(self._arc_to[arc]),
                 float(self._length_m[arc >> 1]),
                 float(self._time_s[arc >> 1]),
-                float(self._blocked_s[arc >> 1]),
+                self._blocked_s.get(arc >> 1, 0.0),
             )
             for arc in arcs
         )
         return Route(nodes, edges, cost_s)
 
-    def _no_route(self, start_id: int, goal_id: int, price: NDArray[np.float32]) -> NoRoute:
-        shut = int((np.isinf(price) & np.isfinite(self._open_price)).sum())
+    def _no_route(self, start_id: int, goal_id: int) -> NoRoute:
+        shut = len(self._closed)
         if shut:
             return NoRoute(f"every way from node {start_id} to {goal_id} is closed ({shut} edges blocked)")
         return NoRoute(f"nodes {start_id} and {goal_id} are not connected")
@@ -172,7 +201,7 @@ class RouteNetwork:
             self._length_m = _grown(self._length_m, size, 0.0)
             self._time_s = _grown(self._time_s, size, 0.0)
             self._open_price = _grown(self._open_price, size, np.inf)
-            self._blocked_s = _grown(self._blocked_s, size, 0.0)
+            self._price = _grown(self._price, size, np.inf)
             self._chained = _grown(self._chained, size, 0)
 
 
