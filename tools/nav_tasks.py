@@ -161,7 +161,7 @@ def drive_metric(
     """Drive to points of the grid one after another; the first plan is the search without its costmap."""
     meters = Meter(), Meter()
     navigator = core.navigation.navigator
-    look = navigator._far  # noqa: SLF001 - measured from outside on purpose
+    look = navigator.lookout.far
     look._search = meters[0].timed(look._search)  # type: ignore[attr-defined]  # noqa: SLF001
     navigator.step = meters[1].timed(navigator.step)  # type: ignore[method-assign]
     legs = Legs(leg, simulator, meters, [Goal(GRID_ID, end) for end in ends])

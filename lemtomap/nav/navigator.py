@@ -18,14 +18,13 @@ from lemtomap.nav.follower import Follower, Motion, Step
 from lemtomap.nav.metric import MetricPlan, reach_from
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
-from lemtomap.nav.outlook import FarLook, Outlook, WindowLook, look_near, outdated
+from lemtomap.nav.outlook import FarLook, Lookout, WindowLook
 from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.sliding import Target, place_of
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
     Contact,
-    CostmapView,
     Goal,
     NavOutput,
     NavState,
@@ -35,7 +34,7 @@ from lemtomap.nav.types import (
 from lemtomap.nav.watching import EdgeClock
 from lemtomap.nav.way import Moment, WayKeeper
 from lemtomap.se2 import Pose
-from lemtomap.types import MapView, RouteEdge, RouteGraph, Twist
+from lemtomap.types import MapView, RouteGraph, Twist
 
 BUMP_BACK_M = 0.15
 AT_NODE_M = 0.5
@@ -51,15 +50,10 @@ class Navigator:
     ) -> None:
         self.config = config or NavConfig()
         self.surroundings = Surroundings(self.config)
-        self._far = far(self.surroundings)
-        self._outlook: Outlook | None = None
-        """What the last far look found; None: look anew."""
-        self._costmap_view: CostmapView | None = None
+        self.lookout = Lookout(self.surroundings, far(self.surroundings), self.config)
         self._goal: Goal | None = None
         self._end: tuple[NavState, Reason, str] = (NavState.IDLE, Reason.NONE, "no goal")
         self._way = WayKeeper(self.config)
-        self._plan: MetricPlan | None = None
-        self._planned_s = -np.inf
         self._lost_s: float | None = None
         self._waiting_s: float | None = None
         self._shut_since_s: float | None = None
@@ -84,9 +78,9 @@ class Navigator:
         """
         stayed = self._goal is not None and self._way_back.stayed_m < STAYED_M
         self._goal = Goal(goal) if isinstance(goal, int) else goal
-        self._way.route, self._plan, self._outlook = None, None, None
+        self._way.route = None
+        self.lookout.restart()
         self._waiting_s = self._lost_s = self._shut_since_s = None
-        self._planned_s = -np.inf
         self._follower.restart()
         if stayed:
             self._progress.move_goal()
@@ -148,7 +142,7 @@ class Navigator:
             moment.events.append(self.surroundings.touch(contact, moment.map_view, moment.T_grid_base))
         if bumps and self._goal is not None:
             self._ladder.back_off(moment.T_odom_base, moment.now_s, BUMP_BACK_M)
-            self._outlook = None
+            self.lookout.forget()
 
     # ---- one cycle with a goal ----
 
@@ -172,49 +166,36 @@ class Navigator:
         return self._go(route, moment) if recovering is None else recovering
 
     def _go(self, route: Route, moment: Moment) -> NavOutput:
-        target = self._target
-        if self._plan is None or target is None:
+        plan, target = self.lookout.plan, self.lookout.target
+        if plan is None or target is None:
             return self._no_way(route, moment)
         self._waiting_s = None
-        return self._drive(route, self._plan, target, moment)
-
-    @property
-    def _target(self) -> Target | None:
-        return None if self._outlook is None else self._outlook.target
+        return self._drive(route, plan, target, moment)
 
     def _look(self, goal: Goal, route: Route, moment: Moment) -> None:
-        """Renew what is known of the way, near by often, over the whole window when it is time."""
-        outlook = self._outlook
-        if outlook is not None and moment.now_s - self._planned_s < self.config.plan_period_s - 1e-6:
+        """Renew what is known of the way; start over where a far look shows it closed. Raises NoRoute."""
+        if not self.lookout.is_due(moment.now_s) and self.lookout.outlook is not None:
             return
-        self._planned_s = moment.now_s
-        self._way.barriers.remember(self.surroundings.hits_grid(moment.map_view.T_grid_odom), moment.now_s)
-        near = None if outlook is None else look_near(self.surroundings, outlook, moment)
-        if (
-            outlook is None
-            or self._way.barriers.watching
-            or outdated(outlook, near, route, moment, self.config)
-        ):
-            outlook = self._outlook = self._far.look(goal, route, moment, self._tolerance_m())
-            self._costmap_view = outlook.reach.costs.view()
-            near = look_near(self.surroundings, outlook, moment)
-            shut_at = self._way.check(goal, outlook.target, outlook.plan, outlook.reach, moment)
-            if shut_at is not None:
-                self.surroundings.hold(shut_at, moment.now_s + self.config.recovery.block_s)
-                self._start_over(moment.now_s)
-                return
-        self._plan = outlook.plan if near is None else near
+        barriers = self._way.barriers
+        barriers.remember(self.surroundings.hits_grid(moment.map_view.T_grid_odom), moment.now_s)
+        found = self.lookout.renew(goal, route, moment, self._tolerance_m(), far=barriers.watching)
+        if found is None:
+            return
+        shut_at = self._way.check(goal, found.target, found.plan, found.reach, moment)
+        if shut_at is not None:
+            self.surroundings.hold(shut_at, moment.now_s + self.config.recovery.block_s)
+            self._start_over(moment.now_s)
 
     def _start_over(self, now_s: float) -> None:
         """The way is another one now: what was measured along the old one no longer counts."""
-        self._plan, self._outlook, self._waiting_s = None, None, None
+        self.lookout.forget()
+        self._waiting_s = None
         self._progress.restart(now_s)
 
     def _no_route(self, moment: Moment, text: str) -> NavOutput:
         """Refuse, unless what bars the way came just now and may go again, or is seen to be gone."""
         barred_s, patience_s = self._way.barred_s, self.config.recovery.barred_patience_s
-        if moment.now_s - self._planned_s >= self.config.plan_period_s - 1e-6:
-            self._planned_s = moment.now_s
+        if self.lookout.is_due(moment.now_s):
             costs = self.surroundings.costs(moment.map_view, moment.T_grid_base, moment.now_s)
             if self._way.reopen(reach_from(costs, moment.T_grid_base), moment):
                 barred_s = moment.now_s
@@ -226,7 +207,7 @@ class Navigator:
 
     def _goal_is_shut(self, route: Route, moment: Moment) -> bool:
         """Tell whether the robot has stood at the goal's node for a while with no way to the goal itself."""
-        target, at_node = self._target, False
+        target, at_node = self.lookout.target, False
         if target is not None and not target.final and target.node_id == route.nodes[-1]:
             place = moment.map_view.T_grid_node.get(target.node_id)
             at_node = place is not None and float(np.hypot(*(place - moment.T_grid_base)[:2])) < AT_NODE_M
@@ -249,8 +230,7 @@ class Navigator:
                 return self._output(moment, REST, *self._end)
         else:
             step = self._follower.step(plan, moment.T_grid_base, moment.twist, end_m)
-        remaining_m = plan.length_m - target.beyond_m + sum(edge.length_m for edge in self._beyond(route))
-        if self._progress.stuck(remaining_m, moment.now_s):
+        if self._progress.stuck(self.lookout.remaining_m(route), moment.now_s):
             return self._climb(moment)
         self._ladder.relax(self._progress.take_gain())
         return self._send(route, plan, target, step, moment)
@@ -262,20 +242,14 @@ class Navigator:
         reason = (
             Reason.OBSTACLE if step.motion == Motion.STUCK or twist.v_mps < step.twist.v_mps else Reason.NONE
         )
-        rest = self._beyond(route)
-        remaining_m = plan.length_m - target.beyond_m + sum(edge.length_m for edge in rest)
         speed_mps = self.config.route.usual_speed_mps
-        expected_s = plan.length_m / speed_mps + sum(edge.time_s for edge in rest)
+        beyond = self.lookout.edges_beyond(route)
+        expected_s = plan.length_m / speed_mps + sum(edge.time_s for edge in beyond)
         return replace(
             self._output(moment, twist, state, reason, f"to node {target.node_id}"),
-            remaining_m=remaining_m,
+            remaining_m=self.lookout.remaining_m(route),
             expected_s=expected_s,
         )
-
-    def _beyond(self, route: Route) -> Sequence[RouteEdge]:
-        """Return the edges of the route behind the present target."""
-        at = None if self._outlook is None else self._outlook.index_in(route)
-        return () if at is None else route.edges[at:]
 
     def _way_to_end(self, plan: MetricPlan, T_grid_base: Pose) -> float:
         away_m = float(np.hypot(*(np.array(plan.p_target_grid) - T_grid_base[:2])))
@@ -312,7 +286,7 @@ class Navigator:
             return self._fail(moment, Reason.BLOCKED, "no progress after every recovery")
         rung = self._ladder.climb(moment.T_odom_base, moment.now_s)
         self._progress.grace(moment.now_s)
-        self._outlook = None
+        self.lookout.forget()
         if rung == Rung.CLEAR:
             self.surroundings.forget_live()
         if rung == Rung.BLOCK and self._way.close_next(moment):
@@ -337,9 +311,9 @@ class Navigator:
 
     def _room_behind(self, moment: Moment) -> bool:
         """Tell whether the costmap leaves room 10 cm behind the robot."""
-        if self._outlook is None:
+        costs = self.lookout.costs
+        if costs is None:
             return True
-        costs = self._outlook.reach.costs if self._plan is None else self._plan.costs
         back = se2.transform(moment.T_grid_base, [-0.10, 0.0])
         if not costs.holds(back):
             return False
@@ -365,14 +339,15 @@ class Navigator:
 
     def _finish(self, state: NavState, reason: Reason, text: str) -> None:
         self._end = (state, reason, text)
-        self._goal = self._way.route = self._plan = self._outlook = None
+        self._goal = self._way.route = None
+        self.lookout.forget()
 
     def _rest(self, moment: Moment) -> NavOutput:
         slower = approach(moment.twist, REST, self.config.body, self.config.period_s)
         return self._output(moment, slower, *self._end)
 
     def _output(self, moment: Moment, twist: Twist, state: NavState, reason: Reason, text: str) -> NavOutput:
-        plan, target, way = self._plan, self._target, self._way.route
+        plan, target, way = self.lookout.plan, self.lookout.target, self._way.route
         return NavOutput(
             stamp_s=moment.now_s,
             twist=twist,
@@ -383,7 +358,7 @@ class Navigator:
             route=() if way is None else way.nodes,
             target_id=None if target is None else target.node_id,
             local_path_grid=np.empty((0, 2)) if plan is None else plan.path_grid,
-            costmap=self._costmap_view,
+            costmap=self.lookout.picture,
         )
 
 

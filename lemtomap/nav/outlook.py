@@ -5,18 +5,21 @@ The near look works the way out anew where it matters, with what the sensors see
 whose border the far look's cost-to-go still holds. So the window is searched once a second, not at each turn.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from lemtomap.nav.config import NavConfig
+from lemtomap.nav.costmap import Costs
 from lemtomap.nav.metric import MetricPlan, Reach, plan_near, plan_to, reach_from
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.sliding import Target, choose_target, find_barrier
 from lemtomap.nav.surroundings import Surroundings
-from lemtomap.nav.types import Goal
+from lemtomap.nav.types import CostmapView, Goal
 from lemtomap.nav.way import Moment
+from lemtomap.types import RouteEdge
 
 NEAR_HALF_M = 2.5
 """Twice what a trajectory covers, so that the way round a person or a chair lies inside."""
@@ -77,6 +80,74 @@ class WindowLook:
         costs = self._surroundings.costs(view, moment.T_grid_base, moment.now_s, tight=tight)
         reach = reach_from(costs, moment.T_grid_base)
         return reach, choose_target(route, goal, view.T_grid_node, reach, tolerance_m)
+
+
+class Lookout:
+    """Keeps both looks fresh: what the robot knows of its way now."""
+
+    def __init__(self, surroundings: Surroundings, far: FarLook, config: NavConfig) -> None:
+        self.far = far
+        self.outlook: Outlook | None = None
+        """What the last far look found; None: look anew."""
+        self.plan: MetricPlan | None = None
+        """The way to the target as last seen near by."""
+        self.picture: CostmapView | None = None
+        """The newest costmap of the far look, for viewers."""
+        self._surroundings, self._config = surroundings, config
+        self._looked_s = -np.inf
+
+    @property
+    def target(self) -> Target | None:
+        """Where to steer; None when nothing of the route can be reached."""
+        return None if self.outlook is None else self.outlook.target
+
+    @property
+    def costs(self) -> Costs | None:
+        """The newest costs around the robot."""
+        if self.plan is not None:
+            return self.plan.costs
+        return None if self.outlook is None else self.outlook.reach.costs
+
+    def forget(self) -> None:
+        """The way is another one now."""
+        self.plan = self.outlook = None
+
+    def restart(self) -> None:
+        """There is a new goal: look at once."""
+        self.forget()
+        self._looked_s = -np.inf
+
+    def is_due(self, now_s: float) -> bool:
+        """Tell, once each period, that it is time to look at what is near."""
+        if now_s - self._looked_s < self._config.plan_period_s - 1e-6:
+            return False
+        self._looked_s = now_s
+        return True
+
+    def renew(
+        self, goal: Goal, route: Route, moment: Moment, tolerance_m: float, *, far: bool
+    ) -> Outlook | None:
+        """Look near by, and far if asked to or due; return what a far look found, None without one."""
+        near = None if self.outlook is None else look_near(self._surroundings, self.outlook, moment)
+        found = None
+        if self.outlook is None or far or outdated(self.outlook, near, route, moment, self._config):
+            found = self.outlook = self.far.look(goal, route, moment, tolerance_m)
+            self.picture = found.reach.costs.view()
+            near = look_near(self._surroundings, found, moment)
+        self.plan = self.outlook.plan if near is None else near
+        return found
+
+    def remaining_m(self, route: Route) -> float:
+        """Return the way to the target and along the edges behind it."""
+        plan, target = self.plan, self.target
+        if plan is None or target is None:
+            return route.length_m
+        return plan.length_m - target.beyond_m + sum(edge.length_m for edge in self.edges_beyond(route))
+
+    def edges_beyond(self, route: Route) -> Sequence[RouteEdge]:
+        """Return the edges of the route behind the target."""
+        at = None if self.outlook is None else self.outlook.index_in(route)
+        return () if at is None else route.edges[at:]
 
 
 def look_near(surroundings: Surroundings, outlook: Outlook, moment: Moment) -> MetricPlan | None:

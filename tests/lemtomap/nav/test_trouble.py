@@ -72,6 +72,22 @@ def test_waits_politely_for_somebody_in_the_doorway():
     assert world.contacts == 0
 
 
+def test_waits_where_somebody_stands_in_the_only_doorway():
+    world = two_rooms()
+    shut(world, 1.75, 2.65)
+    world.pose[:2] = (5.0, 1.0)
+    gone_s = world.now_s + 15.0
+
+    def person(w):
+        w.extra = [(7.0, 2.1, 0.25)] if w.now_s < gone_s else []
+
+    outputs = run(world, Navigator(), 8, 60.0, person)
+    assert outputs[-1].state == NavState.ARRIVED
+    assert any(o.state == NavState.WAITING for o in outputs)
+    assert len(outputs) * 0.1 < 15.0 + 12.0
+    assert world.contacts == 0
+
+
 def test_somebody_who_stays_is_gone_around():
     world = two_rooms()
     world.pose[:2] = (5.0, 1.0)
