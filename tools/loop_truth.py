@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between
 from lemtomap.topo.solve import Problem, solve_whole, straightened
+from tools.relations import nearest_stamps
 
 RELATION_SIGMA = np.array([0.01, 0.01, 0.005])  # m, m, rad: as surely as scans can be laid over one another
 STEP_FLOOR = np.array([0.005, 0.005, 0.002])
@@ -41,6 +42,16 @@ class Reference:
             np.abs(self.ends_m - wanted).max(axis=1), np.abs(self.ends_m - wanted[::-1]).max(axis=1)
         )
         return bool(np.abs(wanted[0] - wanted[1]) <= NEAR_WAY_M or gaps.min(initial=np.inf) <= NEAR_WAY_M)
+
+
+def nearest_scans(
+    stamps_s: NDArray[np.float64], wanted_s: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the scans of pairs of stamps, int64 (R, 2), and whether both were found, bool (R,)."""
+    order = np.argsort(stamps_s, kind="stable")
+    index, found = nearest_stamps(stamps_s[order], wanted_s.ravel())
+    scans = np.asarray(order[index], dtype=np.int64).reshape(-1, 2)
+    return scans, np.asarray(found.reshape(-1, 2).all(axis=1))
 
 
 def reference(

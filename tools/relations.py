@@ -38,8 +38,8 @@ def relation_errors(
     matched.
     """
     order = np.argsort(stamps, kind="stable")
-    first, found_first = _nearest(stamps[order], relations[:, 0])
-    second, found_second = _nearest(stamps[order], relations[:, 1])
+    first, found_first = nearest_stamps(stamps[order], relations[:, 0])
+    second, found_second = nearest_stamps(stamps[order], relations[:, 1])
     rows = np.flatnonzero(found_first & found_second)
     a, b = order[first[rows]], order[second[rows]]
     errors = se2.between(relations[rows, 2:5], se2.between(poses[a], poses[b]))
@@ -60,9 +60,10 @@ def summary_lines(errors: NDArray[np.float64]) -> list[str]:
     ]
 
 
-def _nearest(
+def nearest_stamps(
     sorted_stamps: NDArray[np.float64], wanted: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the index of the stamp nearest to each one wanted, and whether it is the same one."""
     right = np.clip(np.searchsorted(sorted_stamps, wanted), 1, len(sorted_stamps) - 1)
     left = right - 1
     nearer_left = np.abs(sorted_stamps[left] - wanted) <= np.abs(sorted_stamps[right] - wanted)

@@ -26,6 +26,7 @@ class HitMap:
     def __init__(self, size_m: float = 24.0, recent_m: float = RECENT_M) -> None:
         cells = round(size_m / CELL_M)
         self._owner = np.full((cells, cells, 2), np.iinfo(np.int32).min, np.int32)
+        self._taken = np.zeros((cells, cells), np.int8)
         self._sums = np.zeros((cells, cells, 6))
         self._recent_m = recent_m
         self._way_m = 0.0
@@ -42,7 +43,9 @@ class HitMap:
         self._last = np.array(T_grid_base)
         points = transform(T_grid_base, points_base)
         at = (float(T_grid_base[0]), float(T_grid_base[1]))
-        kernels.add_hits(points, *at, CELL_M, self._owner, self._sums, self._way_m, self._recent_m)
+        kernels.add_hits(
+            points, *at, CELL_M, self._owner, self._taken, self._sums, self._way_m, self._recent_m
+        )
 
     def around(
         self, centre_m: tuple[float, float], radius_m: float, grid: GridView, occupied_from: int
@@ -62,6 +65,7 @@ class HitMap:
             return kernels.boundary_cells(grid.occupancy, *window, *centre_m, radius_m, occupied_from)
         return kernels.collect_hits(
             self._owner,
+            self._taken,
             self._sums,
             CELL_M,
             *centre_m,

@@ -21,13 +21,14 @@ def add_hits(
     from_y: float,
     cell: float,
     owner: Indices,
+    taken: Cells,
     sums: Values,
     now: float,
     recent: float,
 ) -> None:
     """Add grid-frame points seen from (from_x, from_y) to a ring of cells: owner (S, S, 2) is whose cell it
-    is, sums (S, S, 6) x, y, n, when it was hit last in metres of way like `now`, and the unit vectors to
-    where it was seen from.
+    is, taken (S, S) 1 where it holds anything, sums (S, S, 6) x, y, n, when it was hit last in metres of way
+    like `now`, and the unit vectors to where it was seen from.
 
     A cell that last belonged to another place of the building, or was hit too long ago, starts anew.
     """
@@ -40,6 +41,7 @@ def add_hits(
         r, c = row % size, col % size
         if owner[r, c, 0] != row or owner[r, c, 1] != col or now - sums[r, c, 3] > recent:
             owner[r, c, 0], owner[r, c, 1] = row, col
+            taken[r, c] = 1
             sums[r, c, :] = 0.0
         if sums[r, c, 2] > 100.0:  # the mean goes on following a wall that moved
             sums[r, c, :3] *= 0.5
@@ -56,6 +58,7 @@ def add_hits(
 @njit(nogil=True, cache=True)
 def collect_hits(
     owner: Indices,
+    taken: Cells,
     sums: Values,
     cell: float,
     centre_x: float,
@@ -76,14 +79,18 @@ def collect_hits(
     rows, cols = occupancy.shape
     reach = min(math.ceil(radius / cell), size // 2 - 1)
     row0, col0 = math.floor(centre_y / cell), math.floor(centre_x / cell)
-    out = np.empty(((2 * reach + 1) ** 2, 4))
+    low_row = max(row0 - reach, math.floor(origin_y / cell))  # what lies outside the window is not believed
+    high_row = min(row0 + reach, math.ceil((origin_y + rows * resolution) / cell))
+    low_col = max(col0 - reach, math.floor(origin_x / cell))
+    high_col = min(col0 + reach, math.ceil((origin_x + cols * resolution) / cell))
+    out = np.empty((max(0, high_row - low_row + 1) * max(0, high_col - low_col + 1), 4))
     count = 0
-    for row in range(row0 - reach, row0 + reach + 1):
-        for col in range(col0 - reach, col0 + reach + 1):
+    for row in range(low_row, high_row + 1):
+        for col in range(low_col, high_col + 1):
             r, c = row % size, col % size
-            if owner[r, c, 0] != row or owner[r, c, 1] != col or sums[r, c, 2] < least:
+            if not taken[r, c] or owner[r, c, 0] != row or owner[r, c, 1] != col:
                 continue
-            if sums[r, c, 3] < since:
+            if sums[r, c, 2] < least or sums[r, c, 3] < since:
                 continue
             x, y = sums[r, c, 0] / sums[r, c, 2], sums[r, c, 1] / sums[r, c, 2]
             i, j = math.floor((y - origin_y) / resolution), math.floor((x - origin_x) / resolution)

@@ -72,6 +72,12 @@ class Audit:
             self._trial_of[edge.edge_id] = trial
         self._due.append(trial)
 
+    def notice(self, edges: Iterable[Edge]) -> None:
+        """Put closures on trial that somebody else has put in."""
+        for edge in edges:
+            if edge.type is EdgeType.LOOP_CLOSING and edge.edge_id not in self._trial_of:
+                self.commit([edge])
+
     def crossed(self, reached: Mapping[int, Reached], node_id: int) -> list[Trial]:
         """Return the trials whose closures lie on the way to a node; closures not seen before come on trial.
 
@@ -81,8 +87,7 @@ class Audit:
         at = node_id
         while (via := reached[at].via) is not None:
             if via.type is EdgeType.LOOP_CLOSING:
-                if via.edge_id not in self._trial_of:
-                    self.commit([via])
+                self.notice([via])
                 trial = self._trial_of[via.edge_id]
                 found[id(trial)] = trial
             at = via.other(at)

@@ -22,7 +22,7 @@ from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
 from lemtomap.topo.loops.outlook import Outlook
 from lemtomap.topo.loops.places import Company, PlaceBook, chain
 from lemtomap.topo.paging import PagedGraph
-from lemtomap.types import GridView
+from lemtomap.types import EdgeType, GridView
 
 USUAL_UNLIKENESS = 45.0  # descriptor distance of two visits to one place
 TRIALS_KEPT = 4096
@@ -174,6 +174,8 @@ class LoopCloser:
         if here_id not in situation.measured:
             return
         reached = self.graph.reach(here_id, audit.way_m, 96)
+        if all(each.via is None or each.via.type is not EdgeType.LOOP_CLOSING for each in reached.values()):
+            return
         best_id, best_m, witnesses = 0, audit.near_m, []
         for node_id, T_here_node in chain(reached).items():
             if node_id in situation.measured or not self._has_place(node_id):

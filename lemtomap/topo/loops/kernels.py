@@ -108,6 +108,28 @@ def pyramid(
 
 
 @njit(nogil=True, cache=True)
+def turned(points_cells: Values, angle_rad: float, slack: float, pad: int, cells: Blocks) -> None:
+    """Put the cell of each point, turned and moved back by `slack` cells, into cells, int32 (N, 2)."""
+    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    for i in range(points_cells.shape[0]):
+        x, y = points_cells[i, 0], points_cells[i, 1]
+        cells[i, 0] = int(np.floor(cos * x - sin * y - slack)) + pad
+        cells[i, 1] = int(np.floor(sin * x + cos * y - slack)) + pad
+
+
+@njit(nogil=True, cache=True)
+def total(layer: Scores, cells: Blocks, col: int, row: int) -> int:
+    """Return the sum of a layer's scores at cells moved by (col, row)."""
+    rows, cols = layer.shape
+    result = 0
+    for i in range(cells.shape[0]):
+        c, r = cells[i, 0] + col, cells[i, 1] + row
+        if 0 <= c < cols and 0 <= r < rows:
+            result += layer[r, c]
+    return result
+
+
+@njit(nogil=True, cache=True)
 def bound(
     stack: Scores,
     points_cells: Values,
@@ -122,18 +144,9 @@ def bound(
     A block holds the translations [col, col + 2**level) x [row, row + 2**level) and the angles whose rotation
     moves no point by more than `slack` cells from where `angle_rad` puts it.
     """
-    pad = 1 << (stack.shape[0] - 1)
-    layer = stack[level + 1] if level > 0 else stack[0]
-    rows, cols = layer.shape
-    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
-    total = 0
-    for i in range(points_cells.shape[0]):
-        x, y = points_cells[i, 0], points_cells[i, 1]
-        c = int(np.floor(cos * x - sin * y - slack)) + col + pad
-        r = int(np.floor(sin * x + cos * y - slack)) + row + pad
-        if 0 <= c < cols and 0 <= r < rows:
-            total += layer[r, c]
-    return total
+    cells = np.empty((points_cells.shape[0], 2), np.int32)
+    turned(points_cells, angle_rad, slack, 1 << (stack.shape[0] - 1), cells)
+    return total(stack[level + 1] if level > 0 else stack[0], cells, col, row)
 
 
 @njit(nogil=True, cache=True)
@@ -203,25 +216,35 @@ def plant(
     least: int,
     heap_key: Indices,
     heap_block: Blocks,
-) -> tuple[int, int]:
-    """Fill the heap with the root blocks of a search whose bound reaches `least`; return (heap size, work
-    done).
+    size: int,
+    begin: int,
+    budget: int,
+) -> tuple[int, int, int]:
+    """Add the root blocks of a search whose bound reaches `least` to the heap, from block number `begin` on.
 
     box: int64 (6,): col from, col to, row from, row to, angle index from, angle index to (exclusive).
+    Returns (heap size, work done, block number to go on with, -1 when all are in).
     """
-    size = 0
-    work = 0
     side = 1 << level
     slack = 0.5 * (side - 1)
-    for angle in range(box[4], box[5], side):
-        middle = angle_0_rad + (angle + slack) * angle_step_rad
-        for row in range(box[2], box[3], side):
-            for col in range(box[0], box[1], side):
-                key = bound(stack, points_cells, level, col, row, middle, slack)
-                work += 1
-                if key >= least and size < heap_key.shape[0]:
-                    size = _push(heap_key, heap_block, size, key, level, col, row, angle)
-    return size, work
+    cols = (box[1] - box[0] + side - 1) // side
+    rows = (box[3] - box[2] + side - 1) // side
+    angles = (box[5] - box[4] + side - 1) // side
+    end = min(cols * rows * angles, begin + budget)
+    pad = 1 << (stack.shape[0] - 1)
+    cells = np.empty((points_cells.shape[0], 2), np.int32)
+    at_angle = -1
+    for block in range(begin, end):
+        col = box[0] + side * (block % cols)
+        row = box[2] + side * (block // cols % rows)
+        angle = box[4] + side * (block // (cols * rows))
+        if at_angle != angle:
+            at_angle = angle
+            turned(points_cells, angle_0_rad + (angle + slack) * angle_step_rad, slack, pad, cells)
+        key = total(stack[level + 1], cells, col, row)
+        if key >= least and size < heap_key.shape[0]:
+            size = _push(heap_key, heap_block, size, key, level, col, row, angle)
+    return size, max(0, end - begin), end if end < cols * rows * angles else -1
 
 
 @njit(nogil=True, cache=True)
@@ -246,6 +269,8 @@ def dig(
     next best.
     """
     work = 0
+    pad = 1 << (stack.shape[0] - 1)
+    cells = np.empty((points_cells.shape[0], 2), np.int32)
     room = heap_key.shape[0] - 8
     while size > 0:
         key = heap_key[0]
@@ -269,7 +294,8 @@ def dig(
             child_angle = angle + k * side
             if child_angle >= box[5]:
                 continue
-            middle = angle_0_rad + (child_angle + slack) * angle_step_rad
+            turned(points_cells, angle_0_rad + (child_angle + slack) * angle_step_rad, slack, pad, cells)
+            layer = stack[child_level + 1] if child_level > 0 else stack[0]
             for i in range(2):
                 child_row = row + i * side
                 if child_row >= box[3]:
@@ -288,7 +314,7 @@ def dig(
                     )
                     if covered:
                         continue
-                    child = bound(stack, points_cells, child_level, child_col, child_row, middle, slack)
+                    child = total(layer, cells, child_col, child_row)
                     work += 1
                     if child >= least:
                         size = _push(

@@ -171,7 +171,9 @@ class Search:
     _angle_step_rad: float = field(init=False)
     _keys: NDArray[np.int64] = field(init=False)
     _blocks: NDArray[np.int32] = field(init=False)
-    _size: int = -1
+    _size: int = 0
+    _planted: int = 0
+    """Root block to go on with; -1 when all are planted."""
     _least: int = 0
     _found: tuple[Pose, int] | None = None
 
@@ -202,8 +204,8 @@ class Search:
 
     def _slice(self, budget: int) -> None:
         stack, config = self.reference.stack, self.reference.config
-        if self._size < 0:
-            self._size, work = kernels.plant(
+        if self._planted >= 0:
+            self._size, work, self._planted = kernels.plant(
                 stack,
                 self._cells,
                 config.levels - 2,
@@ -213,6 +215,9 @@ class Search:
                 self._least,
                 self._keys,
                 self._blocks,
+                self._size,
+                self._planted,
+                budget,
             )
             self.work += work
             return

@@ -133,6 +133,7 @@ class LoopRecogniser:
 
     def _close(self, mapper: "TopoMapper") -> None:
         closer = self._of(mapper)
+        closer.audit.notice(mapper.graph.edges_of(mapper.associated_id))
         for trial in closer.audit.lost():
             self._revoke(mapper, closer, [edge.edge_id for edge in trial.edges])
         closures = closer.update()
