@@ -19,7 +19,7 @@ from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.protocols import NotStarted, Recogniser, Transform
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
-from lemtomap.topo.undoing import cut_off
+from lemtomap.topo.undoing import take_back
 from lemtomap.topo.whereabouts import pose_quality
 from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
 
@@ -300,13 +300,8 @@ class TopoMapper:
 
     def revoke(self, *edge_ids: int) -> None:
         """Take back closures, with what they made the window believe and what grew from them since."""
-        edges = [edge for edge_id in edge_ids if (edge := self.store.edge(edge_id)) is not None]
-        if not edges:
+        if not take_back(self.graph, self.local, edge_ids, COVARIANCE_FLOOR):
             return
-        for edge in edges:
-            self.graph.delete_edge(edge)
-        self.local.release_matched()
-        cut_off(self.graph, self.local, min(edge.edge_id for edge in edges), COVARIANCE_FLOOR)
         self._associated_id = self._own_nearest() or self._associated_id
         self.local.settle(self._associated_id)
         self._align_associated()

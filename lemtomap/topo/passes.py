@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 
 from lemtomap.se2 import Pose, between, transform
 from lemtomap.topo.graph import Covariance, sure_of
-from lemtomap.topo.loops import kernels
 from lemtomap.topo.loops.cells import averaged, thinned
+from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.trail import Look
 
 Points = NDArray[np.float64]
@@ -144,18 +144,18 @@ class _View:
     def __init__(self, hits: Points) -> None:
         hits = hits[np.abs(hits).max(axis=1) < VIEW_RADIUS_M]
         self._targets = averaged(hits, CELL_M)
-        self._normals = kernels.line_normals(self._targets, LINE_M)
+        self._normals = fitting.line_normals(self._targets, LINE_M)
         self._low_m = -VIEW_RADIUS_M - REACH_M
         cells = round(-2.0 * self._low_m / FIELD_M)
         in_cells = (self._targets - self._low_m) / FIELD_M
-        self._index = kernels.nearest_index(in_cells, cells, cells, REACH_M / FIELD_M)
+        self._index = fitting.nearest_index(in_cells, cells, cells, REACH_M / FIELD_M)
 
     def align(
         self, points: Points, T_view_look: Pose, gate_m: float
     ) -> tuple[Pose, NDArray[np.float64], int, float]:
         """Return the aligned pose, its information in the view's axes, hits used, and their residual."""
         low_m = self._low_m
-        return kernels.align(
+        return fitting.align(
             points,
             self._targets,
             self._normals,

@@ -5,6 +5,8 @@ The window has held the robot's own trail all the while, so the nodes born in it
 again and let go of what only the closure said was near.
 """
 
+from collections.abc import Sequence
+
 from lemtomap.se2 import between
 from lemtomap.topo.graph import Covariance, Edge
 from lemtomap.topo.local import LocalMap
@@ -12,19 +14,31 @@ from lemtomap.topo.paging import PagedGraph
 from lemtomap.types import EdgeType
 
 
-def cut_off(graph: PagedGraph, local: LocalMap, since_edge_id: int, floor: Covariance) -> None:
-    """Part the nodes born in this window from all others as far as edges made since a closure join them.
+def take_back(graph: PagedGraph, local: LocalMap, edge_ids: Sequence[int], floor: Covariance) -> bool:
+    """Delete closures and what grew from them; tell whether there was any.
 
     `floor`: least covariance of an edge, float64 (3, 3).
     """
+    edges = [edge for edge_id in edge_ids if (edge := graph.store.edge(edge_id)) is not None]
+    for edge in edges:
+        graph.delete_edge(edge)
+    if edges:
+        local.release_matched()
+        _cut_off(graph, local, min(edge.edge_id for edge in edges), floor)
+    return bool(edges)
+
+
+def _cut_off(graph: PagedGraph, local: LocalMap, since_edge_id: int, floor: Covariance) -> None:
+    """Part the nodes born in this window from all others as far as edges made since a closure join them."""
     born = sorted(n for n, standing in local.standings.items() if standing.born and standing.anchored)
-    own = set(born)
+    own, parted = set(born), set()
     for node_id in born:
         for edge in graph.edges_of(node_id):
             if edge.edge_id > since_edge_id and edge.other(node_id) not in own:
                 graph.delete_edge(edge)
+                parted.add(node_id)
     for k, node_id in enumerate(born[1:], start=1):
-        if not any(edge.other(node_id) in born[:k] for edge in graph.edges_of(node_id)):
+        if node_id in parted and not any(edge.other(node_id) in born[:k] for edge in graph.edges_of(node_id)):
             _join(graph, local, born[k - 1], node_id, floor)
 
 

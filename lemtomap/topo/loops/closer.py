@@ -6,89 +6,26 @@ update. What is found is a sighting; sightings gather into hypotheses; a certain
 """
 
 from collections import deque
-from collections.abc import Callable, Container
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, adjoint, between, compose
-from lemtomap.topo.graph import Covariance, chain_covariance
-from lemtomap.topo.loops.audit import Audit, Trial
+from lemtomap.topo.loops.audit import Audit
+from lemtomap.topo.loops.cases import Closure, Confirmed, Situation, Task
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.descriptor import describe, distances
-from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis, Sighting
+from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis
+from lemtomap.topo.loops.judge import Judge
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
 from lemtomap.topo.loops.outlook import Outlook
-from lemtomap.topo.loops.places import Company, PlaceBook, chain
+from lemtomap.topo.loops.places import PlaceBook, chain
 from lemtomap.topo.paging import PagedGraph
-from lemtomap.types import EdgeType, GridView
+from lemtomap.types import EdgeType
 
 USUAL_UNLIKENESS = 45.0  # descriptor distance of two visits to one place
 TRIALS_KEPT = 4096
-
-
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """Where the robot is, as the mapper sees it at one update."""
-
-    here_id: int
-    T_grid_here: Pose
-    covariance: Covariance
-    """float64 (3, 3) of T_grid_here, axes of the node."""
-    T_grid_base: Pose
-    travelled_m: float
-    grid: GridView
-    unsure_m: float
-    """Way since the robot's own node was sure."""
-    measured: Container[int]
-    """Nodes whose place in this window is sure: born in it, or found in it by a search."""
-
-
-@dataclass(frozen=True, slots=True)
-class Closure:
-    """A relation between two nodes that has become certain."""
-
-    here_id: int
-    node_id: int
-    T_here_node: Pose
-    covariance: Covariance
-    """float64 (3, 3), axes of the target."""
-    T_grid_node: Pose
-    """Where it was seen in the window."""
-    match: Match
-    informs: bool
-    """Whether the first node's place in the window was sure, so that the relation tells something new."""
-    evidence: float
-    """How much its sighting counted, 0..1."""
-
-
-@dataclass(frozen=True, slots=True)
-class Confirmed:
-    """The associated node was found about where the mapper has it, only better."""
-
-    node_id: int
-    T_grid_node: Pose
-    covariance: Covariance
-
-
-@dataclass(slots=True)
-class _Task:
-    """One place to search in one snapshot."""
-
-    node_id: int
-    situation: Situation
-    reference: Reference
-    box: SearchBox
-    way_m: float
-    """Way over edges from the node the robot was at."""
-    hearing_for: Hypothesis | None = None
-    follows: Hypothesis | None = None
-    """The belief that says where the place should be found."""
-    T_grid_followed: Pose | None = None
-    on_trial: tuple[Trial, ...] = ()
-    """Closures that say that the place must be here."""
-    search: Search | None = None
 
 
 class LoopCloser:
@@ -99,13 +36,14 @@ class LoopCloser:
         self.graph = graph
         self.places = PlaceBook(graph, config.company_m, config.search_points)
         self.hypotheses = Hypotheses(config, lambda node_id: self.places.around(node_id, 20.0, 96))
+        self._judge = Judge(config, self.places)
         self.audit = Audit(graph, config.audit, config.gate)
         self.searched = 0
         self.work = 0
         self.confirmed: list[Confirmed] = []
         self._outlook: Outlook | None = None
         self._since_outlook = 0
-        self._tasks: deque[_Task] = deque()
+        self._tasks: deque[Task] = deque()
         self._tried: dict[int, float] = {}
         self._heard: dict[int, float] = {}
         self.log: Callable[[str], None] | None = None
@@ -151,7 +89,7 @@ class LoopCloser:
             reference = reference or Reference(situation.grid, points_grid, self.config.match)
             self._note_trial(node_id, situation.travelled_m)
             way_m = self._way_m(situation.here_id, node_id)
-            task = _Task(node_id, situation, reference, box, way_m)
+            task = Task(node_id, situation, reference, box, way_m)
             task.follows, task.T_grid_followed = followed.get(node_id, (None, None))
             self._tasks.append(task)
         while len(self._tasks) > 4 * self.config.hearing:
@@ -190,7 +128,7 @@ class LoopCloser:
         gate = self.config.gate
         box = SearchBox(T_grid_best, gate.least_box_m, gate.least_box_m, gate.least_box_rad)
         reference = Reference(situation.grid, points_grid, self.config.match)
-        task = _Task(best_id, situation, reference, box, 0.0)
+        task = Task(best_id, situation, reference, box, 0.0)
         task.on_trial, task.T_grid_followed = tuple(witnesses), T_grid_best
         self._tasks.append(task)
 
@@ -243,9 +181,6 @@ class LoopCloser:
         """Return the way over edges to a node; a short one means that it lies in the window anyway."""
         seen = None if self._outlook is None else self._outlook.between(here_id, node_id)
         return np.inf if seen is None else seen.way_m
-
-    def _far_over_edges(self, task: _Task) -> bool:
-        return task.way_m >= self.config.gate.least_way_m
 
     def _spaced(self, node_ids: list[int], count: int) -> list[int]:
         """Return the first few that are not next to one another."""
@@ -308,10 +243,10 @@ class LoopCloser:
     # -- searching
     # --------------------------------------------------------------------------------------------
 
-    def _work(self, task: _Task, budget: int) -> int:
+    def _work(self, task: Task, budget: int) -> int:
         """Do a slice of the first task; return the work spent."""
         if task.search is None:
-            company = self._company(task)
+            company = self._judge.company(task)
             if company is None:
                 self._tasks.popleft()
                 return 1
@@ -323,18 +258,18 @@ class LoopCloser:
         self.work += spent
         if done:
             self._tasks.popleft()
-            self._judge(task)
+            self._conclude(task)
         return max(1, spent)
 
-    def _judge(self, task: _Task) -> None:
+    def _conclude(self, task: Task) -> None:
         """Make a sighting of what a finished search found, and hear the others when it is a new belief."""
         match = task.search.match if task.search is not None else None
         if task.on_trial:
             self._testify(task, match)
             return
         hypothesis = None
-        if match is not None and self._is_sighting(match, task) and not self._confirms(match, task):
-            hypothesis = self.hypotheses.add(self._sighting(task, match))
+        if match is not None and self._judge.is_sighting(match, task) and not self._confirms(match, task):
+            hypothesis = self.hypotheses.add(self._judge.sighting(task, match))
             if self.log:
                 self.log(
                     f"sighting {task.situation.here_id}->{task.node_id} n={len(hypothesis.sightings)} {match}"
@@ -342,36 +277,22 @@ class LoopCloser:
             if len(hypothesis.sightings) == 1:
                 hypothesis.needed = self.config.sightings
                 self._hear(task, hypothesis)
-        if task.follows is not None and hypothesis is not task.follows and self._contradicts(task):
+        if task.follows is not None and hypothesis is not task.follows and self._judge.contradicts(task):
             task.follows.rejected += 1
         if task.hearing_for is not None and not any(t.hearing_for is task.hearing_for for t in self._tasks):
             task.hearing_for.heard = True
 
-    def _company(self, task: _Task) -> Company | None:
-        """Return what is searched: a place with its neighbours; one on trial alone, who knows whose they
-        are.
-        """
-        return self.places.alone(task.node_id) if task.on_trial else self.places.company(task.node_id)
-
-    def _testify(self, task: _Task, match: Match | None) -> None:
+    def _testify(self, task: Task, match: Match | None) -> None:
         """Let a place speak for or against the closures by which it must be here; silent when unsure."""
-        if match is not None and self._is_sighting(match, task):
+        if match is not None and self._judge.is_sighting(match, task):
             if match.weakest >= self.config.corridor:
                 self.audit.hear(task.on_trial, agrees=True)
-        elif self._contradicts(task):
+        elif self._judge.contradicts(task):
             if self.log:
                 self.log(f"witness against {task.situation.here_id}~{task.node_id} {match}")
             self.audit.hear(task.on_trial, agrees=False)
 
-    def _contradicts(self, task: _Task) -> bool:
-        """Tell whether the window shows something else where a belief says that a place must be."""
-        company = self._company(task)
-        if company is None or task.T_grid_followed is None:
-            return False
-        match = task.reference.refine(company.points_node, task.T_grid_followed)
-        return match.known >= self.config.known and match.contradicted >= self.config.refuted
-
-    def _confirms(self, match: Match, task: _Task) -> bool:
+    def _confirms(self, match: Match, task: Task) -> bool:
         """Take a search for the associated node that found it where it was thought to be."""
         situation = task.situation
         if task.node_id != situation.here_id:
@@ -382,56 +303,7 @@ class LoopCloser:
             self.confirmed.append(Confirmed(task.node_id, match.T_grid_place, match.covariance))
         return bool(near)
 
-    def _is_sighting(self, match: Match, task: _Task) -> bool:
-        config = self.config
-        company = self._company(task)
-        explained = match.explained * match.known * (0 if company is None else len(company.points_node))
-        return (
-            match.score >= (config.score if self._far_over_edges(task) else config.slip_score)
-            and match.explained >= config.explained
-            and match.contradicted <= config.contradicted
-            and match.known >= config.known
-            and match.weakest >= config.weakest
-            and match.rival <= config.rival
-            and explained >= config.points
-        )
-
-    def _sighting(self, task: _Task, match: Match) -> Sighting:
-        """Relate the node found to the node the robot was at."""
-        here = task.situation
-        T_here_node = between(here.T_grid_here, match.T_grid_place)
-        covariance = chain_covariance(
-            reversed_covariance(here.T_grid_here, here.covariance), match.T_grid_place, match.covariance
-        )
-        informs = here.here_id in here.measured and here.here_id != task.node_id
-        return Sighting(
-            task.node_id,
-            match,
-            here.here_id,
-            T_here_node,
-            covariance,
-            here.travelled_m,
-            informs,
-            self._evidence(task, match),
-        )
-
-    def _evidence(self, task: _Task, match: Match) -> float:
-        """Return how much a sighting counts: half for each reason to think that it may be chance.
-
-        Along a corridor a place is told by a few door frames, and they repeat; the next metre of travel
-        sees the same frames again, so that only more of the way can tell.
-        """
-        config = self.config
-        company = self.places.company(task.node_id)
-        found = 0.0 if company is None else task.reference.found_in(company.points_node, match.T_grid_place)
-        doubts = [
-            match.weakest < config.corridor,
-            task.box.surprise(match.T_grid_place) > config.surprise,
-            found < config.found,
-        ]
-        return float(0.5 ** sum(doubts))
-
-    def _hear(self, task: _Task, hypothesis: Hypothesis) -> None:
+    def _hear(self, task: Task, hypothesis: Hypothesis) -> None:
         """Search every other place within the gate before the belief may become certain."""
         outlook, gate, situation = self._outlook, self.config.gate, task.situation
         robot = None if outlook is None else self._robot_in(outlook, situation)
@@ -449,7 +321,7 @@ class LoopCloser:
             box = self._box(situation, node_id)
             if box is not None:
                 way_m = self._way_m(situation.here_id, node_id)
-                self._tasks.append(_Task(node_id, situation, task.reference, box, way_m, hypothesis))
+                self._tasks.append(Task(node_id, situation, task.reference, box, way_m, hypothesis))
         hypothesis.heard = not heard
 
     def _commit(self, hypothesis: Hypothesis) -> list[Closure]:
@@ -476,9 +348,3 @@ class LoopCloser:
         self._tasks.clear()
         self._since_outlook = self.config.gate.renew_after
         self.places.forget()
-
-
-def reversed_covariance(T_a_b: Pose, covariance: Covariance) -> Covariance:
-    """Return the covariance of T_b_a (axes of a) from that of T_a_b (axes of b), float64 (3, 3)."""
-    turn = adjoint(T_a_b)
-    return np.asarray(turn @ covariance @ turn.T)

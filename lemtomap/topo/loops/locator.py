@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between, compose, inverse, transform
 from lemtomap.topo.graph import Covariance
-from lemtomap.topo.loops import kernels
 from lemtomap.topo.loops.config import LocatorConfig, LoopConfig
 from lemtomap.topo.loops.descriptor import describe
+from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
 from lemtomap.topo.loops.places import RASTER_M, Company, PlaceBook, kept
@@ -300,7 +300,7 @@ class _View:
         """Return the share of what is seen that lies on the walls of a stored place."""
         T_node_base = between(T_grid_node, self.look.T_grid_base)
         origin_m, points = picture.grid.origin_m, self.search_points
-        hit, _, _ = kernels.tally(points, T_node_base, picture.field, *origin_m, picture.cell_m)
+        hit, _, _ = fitting.tally(points, T_node_base, picture.field, *origin_m, picture.cell_m)
         return float(hit / max(1, len(points)))
 
 

@@ -15,6 +15,7 @@ from lemtomap.se2 import Pose, inverse, pose, transform, wrap_angle
 from lemtomap.topo.graph import sure_of
 from lemtomap.topo.loops import kernels
 from lemtomap.topo.loops.config import MatchConfig
+from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.types import GridView
 
 Points = NDArray[np.float64]
@@ -93,10 +94,10 @@ class Reference:
         )
         self._stack: NDArray[np.int16] | None = None
         self.points_grid = np.ascontiguousarray(points_grid, dtype=np.float64)
-        self.normals = kernels.line_normals(self.points_grid, config.line_reach_m)
+        self.normals = fitting.line_normals(self.points_grid, config.line_reach_m)
         origin = np.array(grid.origin_m)
         rows, cols = grid.occupancy.shape
-        self.index = kernels.nearest_index(
+        self.index = fitting.nearest_index(
             (self.points_grid - origin) / grid.resolution_m, rows, cols, config.nearest_m / grid.resolution_m
         )
 
@@ -111,7 +112,7 @@ class Reference:
         """Return the share of the window's hits around a place that lie on the place's points."""
         near = transform(inverse(T_grid_place), self.points_grid)
         near = near[np.hypot(near[:, 0], near[:, 1]) <= self.config.around_m]
-        return float(kernels.share_near(near, points_place, self.config.around_m, self.cell_m))
+        return float(fitting.share_near(near, points_place, self.config.around_m, self.cell_m))
 
     def refine(
         self, points_place: Points, T_grid_place: Pose, *, score: float = 1.0, rival: float = 0.0
@@ -119,7 +120,7 @@ class Reference:
         """Align a place from a pose that is right within a search cell or two, and measure the fit."""
         config, grid = self.config, self.grid
         origin_x, origin_y = grid.origin_m
-        found, info, used, residual_m = kernels.align(
+        found, info, used, residual_m = fitting.align(
             points_place,
             self.points_grid,
             self.normals,
@@ -133,7 +134,7 @@ class Reference:
             config.rounds,
         )
         found[2] = wrap_angle(found[2])
-        hit, against, unknown = kernels.tally(
+        hit, against, unknown = fitting.tally(
             points_place, found, self.field, origin_x, origin_y, self.cell_m
         )
         known = max(1, hit + against)

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between
 from lemtomap.topo.graph import Place, chain_covariance
-from lemtomap.topo.loops.closer import Closure, Confirmed, LoopCloser, Situation, reversed_covariance
+from lemtomap.topo.loops.cases import Closure, Confirmed, Situation, reversed_covariance
+from lemtomap.topo.loops.closer import LoopCloser
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.descriptor import describe
 from lemtomap.topo.loops.index import PlaceIndex

@@ -6,6 +6,7 @@ import pytest
 from lemtomap.se2 import between, compose, inverse, transform
 from lemtomap.topo.loops import kernels
 from lemtomap.topo.loops.config import MatchConfig
+from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.loops.matcher import Reference, Search, SearchBox
 from lemtomap.types import GridView
 
@@ -142,7 +143,7 @@ def test_tally_counts_as_its_slow_twin_does():
         values.append(field[r, c] if 0 <= r < 30 and 0 <= c < 30 else 0)
     values = np.array(values)
     expected = ((values > 0).sum(), (values < 0).sum(), (values == 0).sum())
-    assert kernels.tally(points, T, field, 0.0, 0.0, 0.1) == expected
+    assert fitting.tally(points, T, field, 0.0, 0.0, 0.1) == expected
 
 
 def test_covariance_is_in_the_places_own_axes():

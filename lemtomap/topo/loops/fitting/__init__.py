@@ -1,0 +1,1 @@
+"""Fine alignment of one set of hits with another."""

@@ -1,0 +1,233 @@
+"""Flat loops of fitting places finely: nearest points, normals of walls, point-to-line alignment, tallies."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Scores = NDArray[np.int16]
+Values = NDArray[np.float64]
+Blocks = NDArray[np.int32]
+
+
+@njit(nogil=True, cache=True)
+def nearest_index(
+    points_cells: Values,
+    rows: int,
+    cols: int,
+    reach: float,
+) -> Blocks:
+    """Return int32 (rows, cols): the index of the nearest point whose distance to the cell's centre is at
+    most
+    `reach` cells, else -1. points_cells: float64 (N, 2), x and y in cells.
+    """
+    index = np.full((rows, cols), -1, dtype=np.int32)
+    best = np.full((rows, cols), np.float32(reach * reach), dtype=np.float32)
+    span = int(np.ceil(reach))
+    for i in range(points_cells.shape[0]):
+        x, y = points_cells[i, 0], points_cells[i, 1]
+        c0, r0 = int(np.floor(x)), int(np.floor(y))
+        for r in range(max(0, r0 - span), min(rows, r0 + span + 1)):
+            for c in range(max(0, c0 - span), min(cols, c0 + span + 1)):
+                dx, dy = c + 0.5 - x, r + 0.5 - y
+                gap = dx * dx + dy * dy
+                if gap < best[r, c]:
+                    best[r, c] = gap
+                    index[r, c] = i
+    return index
+
+
+@njit(nogil=True, cache=True)
+def line_normals(
+    points_m: Values,
+    reach_m: float,
+) -> Values:
+    """Return float64 (N, 3): unit normal x, y of the line through each point's neighbourhood and how thin
+    that
+    neighbourhood is (1 a line, 0 round or alone).
+    """
+    n = points_m.shape[0]
+    order = np.argsort(points_m[:, 0])
+    result = np.zeros((n, 3))
+    reach2 = reach_m * reach_m
+    for k in range(n):
+        i = order[k]
+        x, y = points_m[i, 0], points_m[i, 1]
+        count, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for way in range(2):
+            step = 1 if way == 0 else -1
+            m = k if way == 0 else k - 1
+            while 0 <= m < n:
+                j = order[m]
+                dx, dy = points_m[j, 0] - x, points_m[j, 1] - y
+                if abs(dx) > reach_m:
+                    break
+                if dx * dx + dy * dy <= reach2:
+                    count += 1
+                    sx += dx
+                    sy += dy
+                    sxx += dx * dx
+                    sxy += dx * dy
+                    syy += dy * dy
+                m += step
+        if count < 3:
+            continue
+        mx, my = sx / count, sy / count
+        cxx, cxy, cyy = sxx / count - mx * mx, sxy / count - mx * my, syy / count - my * my
+        half, root = 0.5 * (cxx + cyy), np.sqrt(0.25 * (cxx - cyy) ** 2 + cxy * cxy)
+        large, small = half + root, half - root
+        angle = 0.5 * np.arctan2(2.0 * cxy, cxx - cyy)
+        result[i, 0] = -np.sin(angle)
+        result[i, 1] = np.cos(angle)
+        result[i, 2] = 1.0 - max(small, 0.0) / large if large > 1e-12 else 0.0
+    return result
+
+
+@njit(nogil=True, cache=True)
+def align(
+    points_m: Values,
+    targets_m: Values,
+    normals: Values,
+    index: Blocks,
+    origin_x: float,
+    origin_y: float,
+    resolution_m: float,
+    pose: Values,
+    gate_m: float,
+    sigma_m: float,
+    rounds: int,
+) -> tuple[Values, Values, int, float]:
+    """Move `pose` so that points fall on the lines through their nearest targets; Gauss-Newton,
+    Geman-McClure weights.
+
+    points_m: float64 (N, 2) in the moving frame; targets_m (M, 2) and normals (M, 3) in the fixed frame;
+    index from
+    nearest_index over that frame's cells. Returns (pose (3,), information (3, 3) in the fixed frame about
+    the moved
+    origin, explained points, root mean square residual m).
+    """
+    x, y, yaw = pose[0], pose[1], pose[2]
+    rows, cols = index.shape
+    info = np.zeros((3, 3))
+    used = 0
+    squares = 0.0
+    scale2 = sigma_m * sigma_m
+    for turn in range(rounds):
+        info[:, :] = 0.0
+        b0, b1, b2 = 0.0, 0.0, 0.0
+        used = 0
+        squares = 0.0
+        weight_sum = 0.0
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        for i in range(points_m.shape[0]):
+            rx = cos * points_m[i, 0] - sin * points_m[i, 1]
+            ry = sin * points_m[i, 0] + cos * points_m[i, 1]
+            px, py = rx + x, ry + y
+            c = int(np.floor((px - origin_x) / resolution_m))
+            r = int(np.floor((py - origin_y) / resolution_m))
+            if r < 0 or r >= rows or c < 0 or c >= cols:
+                continue
+            j = index[r, c]
+            if j < 0:
+                continue
+            dx, dy = px - targets_m[j, 0], py - targets_m[j, 1]
+            gap2 = dx * dx + dy * dy
+            if gap2 > gate_m * gate_m:
+                continue
+            thin = normals[j, 2]
+            nx, ny = normals[j, 0], normals[j, 1]
+            if thin < 0.8:
+                gap = np.sqrt(gap2)
+                if gap < 1e-9:
+                    used += 1
+                    continue
+                nx, ny = dx / gap, dy / gap
+            e = dx * nx + dy * ny
+            w = scale2 / (scale2 + e * e)
+            w = w * w
+            j2 = -ry * nx + rx * ny
+            info[0, 0] += w * nx * nx
+            info[0, 1] += w * nx * ny
+            info[0, 2] += w * nx * j2
+            info[1, 1] += w * ny * ny
+            info[1, 2] += w * ny * j2
+            info[2, 2] += w * j2 * j2
+            b0 += w * nx * e
+            b1 += w * ny * e
+            b2 += w * j2 * e
+            used += 1
+            squares += w * e * e
+            weight_sum += w
+        info[1, 0], info[2, 0], info[2, 1] = info[0, 1], info[0, 2], info[1, 2]
+        if weight_sum > 0.0:
+            squares /= weight_sum
+        if used < 6 or turn == rounds - 1:
+            break
+        damped = info.copy()
+        for k in range(3):
+            damped[k, k] += 1e-3 * info[k, k] + 1e-6
+        step = np.linalg.solve(damped, np.array([-b0, -b1, -b2]))
+        x += step[0]
+        y += step[1]
+        yaw += step[2]
+    return np.array([x, y, yaw]), info, used, np.sqrt(squares)
+
+
+@njit(nogil=True, cache=True)
+def tally(
+    points_m: Values,
+    pose: Values,
+    occupancy_score: Scores,
+    origin_x: float,
+    origin_y: float,
+    resolution_m: float,
+) -> tuple[int, int, int]:
+    """Count a node's points by what the window says of them: (explained, contradicted, unknown).
+
+    occupancy_score: a score field (see score_field).
+    """
+    rows, cols = occupancy_score.shape
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    hit, against, unknown = 0, 0, 0
+    for i in range(points_m.shape[0]):
+        px = cos * points_m[i, 0] - sin * points_m[i, 1] + pose[0]
+        py = sin * points_m[i, 0] + cos * points_m[i, 1] + pose[1]
+        c = int(np.floor((px - origin_x) / resolution_m))
+        r = int(np.floor((py - origin_y) / resolution_m))
+        value = occupancy_score[r, c] if 0 <= r < rows and 0 <= c < cols else 0
+        if value > 0:
+            hit += 1
+        elif value < 0:
+            against += 1
+        else:
+            unknown += 1
+    return hit, against, unknown
+
+
+@njit(nogil=True, cache=True)
+def share_near(
+    points_m: Values,
+    targets_m: Values,
+    reach_m: float,
+    cell_m: float,
+) -> float:
+    """Return the share of points that have a target in their cell or one of the two rings around it.
+
+    points_m: float64 (N, 2), targets_m: float64 (M, 2), one frame; targets further than `reach_m` and two
+    cells from the origin (Chebyshev) are not needed. 1 when there are no points.
+    """
+    half = int(np.ceil(reach_m / cell_m)) + 3
+    taken = np.zeros((2 * half + 1, 2 * half + 1), dtype=np.bool_)
+    for i in range(targets_m.shape[0]):
+        c = int(np.floor(targets_m[i, 0] / cell_m)) + half
+        r = int(np.floor(targets_m[i, 1] / cell_m)) + half
+        if 2 <= c < 2 * half - 1 and 2 <= r < 2 * half - 1:
+            taken[r - 2 : r + 3, c - 2 : c + 3] = True
+    if points_m.shape[0] == 0:
+        return 1.0
+    count = 0
+    for i in range(points_m.shape[0]):
+        c = int(np.floor(points_m[i, 0] / cell_m)) + half
+        r = int(np.floor(points_m[i, 1] / cell_m)) + half
+        if 0 <= c < 2 * half + 1 and 0 <= r < 2 * half + 1 and taken[r, c]:
+            count += 1
+    return float(count / points_m.shape[0])

@@ -1,0 +1,83 @@
+"""What a finished search is worth: a sighting or not, how much it counts, and what contradicts a belief."""
+
+from dataclasses import dataclass
+
+from lemtomap.se2 import between
+from lemtomap.topo.graph import chain_covariance
+from lemtomap.topo.loops.cases import Task, reversed_covariance
+from lemtomap.topo.loops.config import LoopConfig
+from lemtomap.topo.loops.hypotheses import Sighting
+from lemtomap.topo.loops.matcher import Match
+from lemtomap.topo.loops.places import Company, PlaceBook
+
+
+@dataclass(frozen=True, slots=True)
+class Judge:
+    """Weighs matches; keeps nothing."""
+
+    config: LoopConfig
+    places: PlaceBook
+
+    def company(self, task: Task) -> Company | None:
+        """Return what is searched: a place with its neighbours; one on trial alone, who knows whose they
+        are.
+        """
+        return self.places.alone(task.node_id) if task.on_trial else self.places.company(task.node_id)
+
+    def is_sighting(self, match: Match, task: Task) -> bool:
+        """Tell whether a place was found: most of it seen, little against it, no other pose as good."""
+        config = self.config
+        company = self.company(task)
+        explained = match.explained * match.known * (0 if company is None else len(company.points_node))
+        return (
+            match.score >= (config.score if task.way_m >= config.gate.least_way_m else config.slip_score)
+            and match.explained >= config.explained
+            and match.contradicted <= config.contradicted
+            and match.known >= config.known
+            and match.weakest >= config.weakest
+            and match.rival <= config.rival
+            and explained >= config.points
+        )
+
+    def sighting(self, task: Task, match: Match) -> Sighting:
+        """Relate the node found to the node the robot was at."""
+        here = task.situation
+        T_here_node = between(here.T_grid_here, match.T_grid_place)
+        covariance = chain_covariance(
+            reversed_covariance(here.T_grid_here, here.covariance), match.T_grid_place, match.covariance
+        )
+        informs = here.here_id in here.measured and here.here_id != task.node_id
+        return Sighting(
+            task.node_id,
+            match,
+            here.here_id,
+            T_here_node,
+            covariance,
+            here.travelled_m,
+            informs,
+            self._evidence(task, match),
+        )
+
+    def _evidence(self, task: Task, match: Match) -> float:
+        """Return how much a sighting counts: half for each reason to think that it may be chance.
+
+        Along a corridor a place is told by a few door frames, and they repeat; the next metre of travel
+        sees the same frames again, so that only more of the way can tell.
+        """
+        config = self.config
+        company = self.places.company(task.node_id)
+        found = 0.0 if company is None else task.reference.found_in(company.points_node, match.T_grid_place)
+        doubts = [
+            match.weakest < config.corridor,
+            task.box.surprise(match.T_grid_place) > config.surprise,
+            found < config.found,
+        ]
+        return float(0.5 ** sum(doubts))
+
+    def contradicts(self, task: Task) -> bool:
+        """Tell whether the window shows something else where a belief says that a place must be."""
+        company = self.company(task)
+        if company is None or task.T_grid_followed is None:
+            return False
+        match = task.reference.refine(company.points_node, task.T_grid_followed)
+        return match.known >= self.config.known and match.contradicted >= self.config.refuted
