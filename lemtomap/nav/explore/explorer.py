@@ -80,7 +80,7 @@ class Explorer:
         self._nav = nav or NavConfig()
         self._costmap = Costmap(self._nav.costmap, self._nav.body)
         self._memory = SeenMemory()
-        self._openings = Openings()
+        self._openings = Openings(self.config.least_size_m)
         self._recalled = False
         self._pursuit: _Pursuit | None = None
         self._looked_s = -np.inf
@@ -126,8 +126,8 @@ class Explorer:
         reach = reach_from(costs, T_grid_base)
         self._memory.take(costs, map_view.T_grid_node, T_grid_base)
         seen = self._memory.recall(costs, map_view.T_grid_node)
-        ground = Ground.of(costs, seen, config.least_depth_m)
-        openings = find_openings(reach, ground, config.least_size_m)
+        ground = Ground.of(reach, seen, config.least_depth_m)
+        openings = find_openings(ground, config.rest_size_m)
         self._openings.match(openings, ground, map_view.T_grid_node, map_view.associated_id, now_s)
         return reach
 
@@ -166,10 +166,10 @@ class Explorer:
             for placeholder in ready:
                 self._give_up(placeholder.placeholder_id, here.now_s)
             return None
-        number = min(prices, key=lambda n: prices[n])
+        number = min(prices, key=lambda n: prices[n].price_m)
         pursued = None if pursuit is None else prices.get(pursuit.number)
         if pursuit is not None and pursued is not None:
-            better = prices[number].way_m < self.config.switch_share * pursued.way_m
+            better = prices[number].price_m < self.config.switch_share * pursued.price_m
             number = number if better else pursuit.number
         opening = next(p for p in ready if p.placeholder_id == number)
         return self._pursue(opening, prices[number], here.now_s)
@@ -196,7 +196,7 @@ class Explorer:
         goal = Goal(opening.node_id, place, None, self.config.goal_tolerance_m)
         if pursuit is not None and _same_place(pursuit.goal, goal):
             return None
-        until_s = now_s + self.config.patience_s + price.way_m / self.config.slow_mps
+        until_s = now_s + self.config.patience_s + price.price_m / self.config.slow_mps
         self._pursuit = _Pursuit(opening.placeholder_id, goal, until_s, now_s, pressing=pressing)
         return goal
 

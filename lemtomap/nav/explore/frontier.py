@@ -24,9 +24,10 @@ class Opening:
     size_m: float
 
 
-def find_openings(reach: Reach, ground: Ground, least_size_m: float) -> list[Opening]:
+def find_openings(ground: Ground, least_size_m: float) -> list[Opening]:
     """Return the openings of the window onto large unseen patches."""
-    res, large = reach.costs.resolution_m, ground.large
+    reach, large = ground.reach, ground.large
+    res = reach.costs.resolution_m
     mask = kernels.frontier_cells(reach.level, reach.costs.state, large, NEAR_CELLS)
     label = np.zeros(mask.shape, dtype=np.int32)
     count = kernels.label_clusters(mask, label, JOIN_CELLS)

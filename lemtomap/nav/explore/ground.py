@@ -7,41 +7,47 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore import kernels
+from lemtomap.nav.metric import Reach
 from lemtomap.se2 import Pose
 
 NEAR_CELLS = 4
 """Remembered ground is drawn this much too large; new ground begins beyond."""
 JUDGED_M = 0.5
 """Nearer to the window's border than this nothing is said about an opening."""
+UP_TO_M = 0.3
+"""An opening's place in the window may be off by this much."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
     """One look at the window."""
 
-    costs: Costs
+    reach: Reach
     large: NDArray[np.uint8]
     """uint8 (rows, cols), 1 on unseen ground of some depth."""
 
     @classmethod
-    def of(cls, costs: Costs, seen: NDArray[np.uint8], least_depth_m: float) -> Self:
+    def of(cls, reach: Reach, seen: NDArray[np.uint8], least_depth_m: float) -> Self:
         """Return the ground as a window shows it.
 
         seen: uint8 (rows, cols), 1 where the ground is known or was known once; a patch of unseen ground
         counts when a square of twice least_depth_m fits into it.
         """
-        depth = max(1, round(least_depth_m / costs.resolution_m))
-        return cls(costs, np.asarray(kernels.large_unknown(seen, depth)))
+        depth = max(1, round(least_depth_m / reach.costs.resolution_m))
+        return cls(reach, np.asarray(kernels.large_unknown(seen, depth)))
 
     def still_open(self, p_grid: ArrayLike) -> bool:
-        """Tell whether an opening at a place of the window may still lead to unseen ground."""
-        if not self.costs.holds(p_grid, JUDGED_M):
+        """Tell whether an opening that was not found again at its place may still lead to unseen ground.
+
+        It does not where the window shows the floor up to it; it may where that has been forgotten.
+        """
+        costs = self.reach.costs
+        if not costs.holds(p_grid, JUDGED_M):
             return True
-        return bool(
-            kernels.dark_in_sight(self.costs.state, self.large, *self.costs.cell(p_grid), NEAR_CELLS + 2.0)
-        )
+        if self.reach.nearest(p_grid, UP_TO_M) is not None:
+            return False
+        return bool(kernels.dark_in_sight(costs.state, self.large, *costs.cell(p_grid), NEAR_CELLS + 2.0))
 
     def walled_off(self, p_grid: ArrayLike, q_grid: ArrayLike) -> bool:
         """Tell whether an obstacle stands between two places."""
@@ -60,6 +66,5 @@ class Ground:
         return otherwise_id if otherwise_id in away else min(away, key=lambda n: away[n])
 
     def _worst(self, p_grid: ArrayLike, q_grid: ArrayLike) -> int:
-        return int(
-            kernels.worst_between(self.costs.state, *self.costs.cell(p_grid), *self.costs.cell(q_grid))
-        )
+        costs = self.reach.costs
+        return int(kernels.worst_between(costs.state, *costs.cell(p_grid), *costs.cell(q_grid)))

@@ -30,7 +30,8 @@ class _Kept:
 class Openings:
     """All placeholders, and the events that keep the topological map's copy up to date."""
 
-    def __init__(self) -> None:
+    def __init__(self, least_size_m: float = 0.0) -> None:
+        self._least_size_m = least_size_m
         self._kept: dict[int, _Kept] = {}
         self._next_id = 1
         self._events: list[NavEvent] = []
@@ -88,6 +89,8 @@ class Openings:
                 del free[number]
             elif _same(opening.p_grid, places, ground) is not None:
                 continue  # a second piece of an opening already matched
+            if number is None and opening.size_m < self._least_size_m:
+                continue  # enough to go on with, too little to begin with
             known_from = here_id
             if number is not None:
                 self._reopen(self._kept[number], now_s)

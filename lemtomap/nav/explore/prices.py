@@ -32,7 +32,7 @@ class Here:
 class Price(NamedTuple):
     """What an opening costs."""
 
-    way_m: float
+    price_m: float
     direct: bool
     """It can be reached through the window; else its node is to be reached first."""
 
@@ -54,7 +54,7 @@ def price_openings(openings: Sequence[Placeholder], here: Here, config: ExploreC
             away.append(opening)
         else:
             prices[opening.placeholder_id] = Price(price_m, direct=True)
-    if away and (not prices or min(prices.values()).way_m > config.window_first_m):
+    if away and (not prices or min(prices.values()).price_m > config.window_first_m):
         prices |= {number: Price(way_m, direct=False) for number, way_m in _by_route(away, here).items()}
     return prices
 
@@ -77,7 +77,10 @@ def _in_window(
     if np.hypot(dx, dy) <= config.goal_tolerance_m:
         way_m += config.here_price_m
     turn_rad = abs(float(se2.wrap_angle(np.arctan2(dy, dx) - T_grid_base[2])))
-    return way_m + config.turn_price_m * turn_rad / np.pi if np.isfinite(way_m) else None
+    price_m = way_m + config.turn_price_m * turn_rad / np.pi
+    if opening.width_m < config.small_m:
+        price_m *= config.small_share
+    return price_m if np.isfinite(way_m) else None
 
 
 def _by_route(openings: Sequence[Placeholder], here: Here) -> dict[int, float]:

@@ -1,6 +1,7 @@
 """What becomes of one opening: kept, told apart, reached from the right node, tried again, closed."""
 
 import numpy as np
+import pytest
 
 from lemtomap import se2
 from lemtomap.nav import kernels
@@ -8,6 +9,7 @@ from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore.frontier import Opening
 from lemtomap.nav.explore.ground import Ground
 from lemtomap.nav.explore.openings import Openings
+from lemtomap.nav.metric import reach_from
 from lemtomap.topo.events import OpeningDone
 from lemtomap.topo.graph import OpeningState
 
@@ -22,9 +24,10 @@ def ground(unknown=(), walls=(), seen=None) -> Ground:
         for x0, y0, x1, y1 in boxes:
             state[round(y0 / RES) : round(y1 / RES), round(x0 / RES) : round(x1 / RES)] = value
     clearance = np.full(state.shape, 9.0, dtype=np.float32)
-    costs = Costs(0.0, RES, (0.0, 0.0), state, clearance, np.ones(state.shape, dtype=np.float32))
+    cost = np.where(state == kernels.FREE, 1.0, np.inf).astype(np.float32)
+    costs = Costs(0.0, RES, (0.0, 0.0), state, clearance, cost)
     known = (state != kernels.UNKNOWN) if seen is None else seen
-    return Ground.of(costs, known.astype(np.uint8), 0.2)
+    return Ground.of(reach_from(costs, (1.0, 1.0)), known.astype(np.uint8), 0.2)
 
 
 DARK_ROOM = (4.0, 0.0, 6.0, 6.0)
@@ -52,10 +55,18 @@ def test_is_kept_while_the_window_has_forgotten_the_ground_around_it():
     assert openings.get(number) is not None
 
 
-def test_is_explored_when_only_a_wall_hides_the_dark():
+def test_is_explored_when_what_is_left_of_it_is_too_small_to_be_found():
     openings, number = one_opening()
-    openings.match([], ground([(4.1, 0.0, 6.0, 6.0)], [(4.0, 0.0, 4.1, 6.0)]), NODES, 1, 1.0)
+    openings.match([], ground([DARK_ROOM]), NODES, 1, 1.0)
     assert openings.get(number) is None
+
+
+@pytest.mark.parametrize(("wall", "kept"), [((4.0, 0.0, 4.1, 6.0), False), ((0.0, 0.0, 0.1, 6.0), True)])
+def test_out_of_reach_is_kept_unless_a_wall_hides_the_dark(wall, kept):
+    openings, number = one_opening()
+    shut_in = [(0.5, 1.5, 1.5, 1.6), (0.5, 0.4, 1.5, 0.5), (0.5, 0.4, 0.6, 1.6), (1.4, 0.4, 1.5, 1.6)]
+    openings.match([], ground([(4.1, 0.0, 6.0, 6.0)], [wall, *shut_in]), NODES, 1, 1.0)
+    assert (openings.get(number) is not None) is kept
 
 
 def test_one_behind_a_wall_is_another_one():
