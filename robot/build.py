@@ -7,6 +7,7 @@ from lemtomap.grid import DEFAULT_SLAM, SLAMS
 from lemtomap.nav.navigator import Navigator
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.pruning import prune
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
 from robot.base import BaseStep
@@ -30,8 +31,10 @@ def build_core(
 ) -> RobotCore:
     """Return a robot that maps into `map_path`, a new file or an existing map. Raises BadMap, BadSetting."""
     exchange = Exchange()
-    make = TopoStore.open if map_path.exists() else TopoStore.create
-    store = make(map_path, durable=durable)
+    known = map_path.exists()
+    store = (TopoStore.open if known else TopoStore.create)(map_path, durable=durable)
+    if known:
+        prune(store)
     recogniser = None if slam == "gmapping" else LoopRecogniser()  # a growing grid is too large to search
     mapper = TopoMapper(config.topo, store, recogniser=recogniser)
     mapping = MappingStep(lambda: build_slam(slam, config, seed), mapper, exchange)

@@ -17,6 +17,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.place import decode_place
+from lemtomap.topo.pruning import prune
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.whereabouts import RIGHT_M, RIGHT_RAD
 from lemtomap.types import MapView
@@ -38,6 +39,8 @@ class Score:
     scans: int = 0
     path_m: float = 0.0
     nodes: int = 0
+    pruned: int = 0
+    """Nodes that went before the drive began."""
     closures: int = 0
     wrong: int = 0
     worst_m: float = 0.0
@@ -57,8 +60,10 @@ class JudgedMap:
     def __init__(self, path: Path, world: World) -> None:
         self._born_path = path.with_suffix(".born.json")
         make = TopoStore.open if path.exists() else TopoStore.create
+        store = make(path, durable=False)
+        self.pruned = prune(store)
         self.recogniser = LoopRecogniser()
-        self.mapper = TopoMapper(TopoConfig(), make(path, durable=False), recogniser=self.recogniser)
+        self.mapper = TopoMapper(TopoConfig(), store, recogniser=self.recogniser)
         self.born: dict[int, Pose] = load_born(path)
         self.exchange = Exchange()
         self.step = MappingStep(lambda: WindowMatcher(SlamConfig()), self.mapper, self.exchange)
@@ -154,6 +159,7 @@ class JudgedMap:
             self.score.worst_m = max(self.score.worst_m, off_m)
             self.score.wrong += off_m > WRONG_M or abs(float(off[2])) > WRONG_RAD
         self.score.closures = len(self.recogniser.closures)
+        self.score.pruned = len(self.pruned)
         self.score.nodes = self.mapper.store.count("node")
         self.step.close()
         self._born_path.write_text(json.dumps({str(i): T.tolist() for i, T in self.born.items()}))
