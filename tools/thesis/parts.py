@@ -61,24 +61,30 @@ class MetricMapping(Part):
     def begin(self, *, known: bool = False) -> None:  # noqa: ARG002 - only the map file lasts
         """Start with an empty map."""
         self._slam = SLAMS[self.options.slam](SlamConfig(particles=self.options.particles), self.options.seed)
-        self._poses: list[se2.Pose] = []
+        self._track = (self.options.out / "track.bin").open("wb")  # on disk: memory is what is measured
         self._published_s = -np.inf
+
+    def drop(self) -> None:
+        """Close the track."""
+        self._track.close()
 
     def take(self, frame: Frame) -> None:
         """Match the scan; publish the window whenever it changed, the whole grid every few seconds."""
         frame.update = self._slam.update(frame.scan, frame.odometry)
         frame.points_base = self._slam.points_base()
         due = frame.drive_s - self._published_s >= PUBLISH_S - 1e-6
-        if due if self.options.slam == "gmapping" else frame.update.integrated or not self._poses:
+        if due if self.options.slam == "gmapping" else frame.update.integrated or self._published_s < 0.0:
             self._published_s = frame.drive_s
             frame.grid = self._slam.view()
-        self._poses.append(frame.update.T_grid_base)
+        self._track.write(np.asarray(frame.update.T_grid_base, dtype=np.float64).tobytes())
 
     def finish(self) -> dict[str, Any]:
         """Write the grid map; tell its size."""
+        self._track.close()
         if self.options.slam == "gmapping":
             outputs.write_grid(self.options.out, self._slam.view())
-            np.save(self.options.out / "track.npy", np.array(self._poses))
+            track = np.fromfile(self.options.out / "track.bin").reshape(-1, 3)
+            np.save(self.options.out / "track.npy", track)
             return {"map_bytes": (self.options.out / "grid.pgm").stat().st_size}
         return {}
 
