@@ -36,7 +36,8 @@ class SlamConfig:
     match_sigma_m: float = 0.05  # reach of the robust weight
     match_noise_m: float = 0.04  # of one beam, widened because beams err together
     point_weight: float = 0.8  # of a hit that lies on no plane, against one that does
-    degenerate_below: float = 0.08  # diversity (Appendix D) under which the weak axis follows odometry
+    degenerate_below: float = 0.08  # diversity (Appendix D) under which the weak axis follows odometry; from
+    # there to twice as much the scan gains a say bit by bit
     min_points: int = 20
     min_quality: float = 0.25  # a worse match is refused
     new_ground_below: float = 0.25  # share of hits in cells the window knows; below it odometry leads on

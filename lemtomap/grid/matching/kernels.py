@@ -115,7 +115,10 @@ def _linearise(
 
 @njit(nogil=True, cache=True)
 def _gate(H: Array, b: Array, gate: float) -> float:
-    """Drop what the match says along the weak axis of the surfaces; return the diversity 0..1."""
+    """Drop what the match says along the weak axis of the surfaces, part of it up to twice the gate.
+
+    Returns the diversity 0..1.
+    """
     nxx, nxy, nyy = H[0, 0], H[0, 1], H[1, 1]  # the spread of surface directions
     middle = 0.5 * (nxx + nyy)
     half = 0.5 * (nxx - nyy)
@@ -123,10 +126,12 @@ def _gate(H: Array, b: Array, gate: float) -> float:
     if middle <= 0.0:
         return 0.0
     diversity = (middle - root) / middle
-    if diversity < gate:
+    if diversity < 2.0 * gate:
+        kept = max(diversity / gate - 1.0, 0.0)
+        drop, drop_b = 1.0 - math.sqrt(kept), 1.0 - kept
         weak = 0.5 * math.atan2(nxy, half) + 0.5 * math.pi
         ux, uy = math.cos(weak), math.sin(weak)
-        pxx, pxy, pyy = 1.0 - ux * ux, -ux * uy, 1.0 - uy * uy
+        pxx, pxy, pyy = 1.0 - drop * ux * ux, -drop * ux * uy, 1.0 - drop * uy * uy
         h00 = pxx * H[0, 0] + pxy * H[1, 0]
         h01 = pxx * H[0, 1] + pxy * H[1, 1]
         h02 = pxx * H[0, 2] + pxy * H[1, 2]
@@ -140,7 +145,8 @@ def _gate(H: Array, b: Array, gate: float) -> float:
         H[0, 2], H[1, 2] = h02, h12
         H[2, 0], H[2, 1] = h02, h12
         b0, b1 = b[0], b[1]
-        b[0], b[1] = pxx * b0 + pxy * b1, pxy * b0 + pyy * b1
+        along = drop_b * (ux * b0 + uy * b1)
+        b[0], b[1] = b0 - along * ux, b1 - along * uy
     return float(diversity)
 
 
