@@ -49,7 +49,6 @@ class Result:
     path_m: float = 0.0
     greedy_m: float = 0.0
     contacts: int = 0
-    nodes: int = 0
     cpu_s: float = 0.0
     grown: list[tuple[float, float, float]] = field(default_factory=list)
     """(time s, path m, share seen) every two minutes."""
@@ -97,7 +96,6 @@ def explore(world: World, seed: int, duration_s: float, out: Path) -> Result:
     with tempfile.TemporaryDirectory() as folder:
         core = build_core(RobotConfig(), Path(folder) / "map.lemto", durable=False, seed=seed)
         ended = run_lockstep(simulator, core, parse_mission("explore"), duration_s, watch=onlooker)
-        result.nodes = core.mapping.mapper.info().nodes if hasattr(core.mapping.mapper, "info") else 0
         core.close()
     truth = simulator.truth()
     simulator.close()
@@ -105,6 +103,10 @@ def explore(world: World, seed: int, duration_s: float, out: Path) -> Result:
     result.state, result.text, result.time_s = str(ended.state), ended.text, round(ended.now_s, 1)
     result.share, result.path_m = floor.share(onlooker.seen), round(truth.path_m, 1)
     result.contacts = truth.contact_count
+    print(
+        f"    {result.time_s:6.0f} s {truth.path_m:6.0f} m {100 * result.share:5.1f} % seen: {result.text}",
+        flush=True,
+    )
     greedy = GreedyExplorer(floor, world.spawn[:2])
     result.greedy_m = round(greedy.explore(result.share), 1)
     picture(floor, onlooker, greedy, result, out)

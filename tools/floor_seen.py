@@ -22,7 +22,7 @@ Cell = tuple[int, int]
 BODY_M = 0.20  # Kobuki's 0.178 m and the half cell that a map cannot tell
 SILENT_FREE_M = 2.0  # what a beam without an answer proves free (robot.bridge)
 TYPICAL_REACH_M = 4.5  # of a URG-04LX on indoor walls: 5.2 m on white ones met square, less on all others
-LOOK_EVERY_M = 0.25
+LOOK_EVERY_M = 0.5
 CRUMB_M2 = 0.10  # a perfect explorer need not look behind each table's leg
 
 
@@ -124,6 +124,7 @@ class GreedyExplorer:
         self._floor = floor
         self._cost = np.where(floor.standing, np.float32(1.0), np.float32(np.inf))
         self.seen: Mask = np.zeros(floor.floor.shape, dtype=np.bool_)
+        self._around = round(BODY_M / floor.cell_m) + 1
         self.track = [start_m]
         self.path_m = 0.0
         see_round(self.seen, floor.raster, start_m)
@@ -154,7 +155,8 @@ class GreedyExplorer:
             self.track.append(here)
         see_round(self.seen, raster, self.track[-1])
         if len(path) < 2:  # it stands on the patch: what it cannot see from here it never will
-            self.seen[max(row - 4, 0) : row + 5, max(col - 4, 0) : col + 5] = True
+            near = self._around + 1
+            self.seen[max(row - near, 0) : row + near + 1, max(col - near, 0) : col + near + 1] = True
         return True
 
     def _dark(self) -> Mask:
@@ -163,5 +165,4 @@ class GreedyExplorer:
         sizes = np.bincount(labels.ravel())
         sizes[0] = 0
         large = (sizes * self._floor.cell_m**2 >= CRUMB_M2)[labels]
-        around = round(BODY_M / self._floor.cell_m) + 1
-        return np.asarray(ndimage.binary_dilation(large, iterations=around))
+        return np.asarray(ndimage.binary_dilation(large, iterations=self._around))
