@@ -20,6 +20,9 @@ FRESH_S = 0.6
 """Range points older than this say nothing about what is in front of the body now."""
 HOLD_M = 0.9
 SAME_M = 0.05
+ASIDE_M = (-0.25, 0.0, 0.25)
+"""A Kobuki's bumper tells one of three directions and nothing of how wide the thing is. What is overlooked
+is a bar or a chair's foot: this much to both sides of the touch, and the mark's own radius, covers it."""
 
 
 @runtime_checkable
@@ -74,10 +77,9 @@ class Surroundings:
     def touch(self, contact: Contact, map_view: MapView, T_grid_base: Pose) -> Bumped:
         """Remember a contact, in the frame of the associated node, and return what the map is told."""
         reach_m = self._config.body.radius_m + self._config.costmap.contact_radius_m
-        # A Kobuki's bumper tells one of three directions only, so a short arc is marked, not a point.
-        spread = (-0.3, 0.0, 0.3) if contact.kind == ContactKind.BUMPER else (0.0,)
-        bearings = contact.bearing_rad + np.array(spread)
-        p_base = reach_m * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+        aside = np.array(ASIDE_M if contact.kind == ContactKind.BUMPER else (0.0,))
+        along, across = np.cos(contact.bearing_rad), np.sin(contact.bearing_rad)
+        p_base = np.stack([reach_m * along - aside * across, reach_m * across + aside * along], axis=-1)
         T_grid_node = map_view.T_grid_node.get(map_view.associated_id)
         if T_grid_node is not None:
             for x, y in se2.transform(se2.between(T_grid_node, T_grid_base), p_base):
