@@ -89,10 +89,16 @@ class MappingStep:
         self._exchange.map_view.put(view)
         if view.lost != self._lost:
             self._lost = view.lost
-            text, level = (
-                ("lost: looking for the place", Level.WARN) if view.lost else ("found again", Level.INFO)
-            )
-            self._exchange.note(view.stamp_s, "mapping", text, level)
+            self._tell(view)
+
+    def _tell(self, view: MapView) -> None:
+        if view.lost:
+            text, level = "lost: looking for the place", Level.WARN
+        elif self.mapper.known_place:
+            text, level = "found again", Level.INFO
+        else:
+            text, level = "nothing here looks like the map: mapping on as a new part of it", Level.WARN
+        self._exchange.note(view.stamp_s, "mapping", text, level)
 
     def close(self) -> None:
         """Write the map to disk."""

@@ -69,6 +69,8 @@ class TopoMapper:
         """How well the latest scan fits the window, as a share of what is usual; set by whoever watches."""
         self.lost = False
         """The robot does not know where in the map it is; it maps on in a part of its own."""
+        self.known_place = True
+        """False: it gave up looking, and maps on as if this were new; a closure may still join the two."""
         self.part_id = 1
         """First node of the part of the graph made since the robot was lost or switched on."""
         self._recogniser = recogniser
@@ -334,9 +336,9 @@ class TopoMapper:
         self.local.standings.clear()
         self._now = None
 
-    def found(self) -> None:
-        """Say that the robot knows its place again, or that nothing of the map is known here."""
-        self.lost = False
+    def found(self, *, known: bool = True) -> None:
+        """Say that the robot knows its place again, or that this must be a place not mapped yet."""
+        self.lost, self.known_place = False, known
 
     def _look_for_place(self) -> None:
         self.lost = True

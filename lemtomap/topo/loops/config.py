@@ -93,6 +93,10 @@ class LocatorConfig:
     checks: int = 3  # that a guess must have stood, ...
     moved_m: float = 0.8  # ... over this travel ...
     moved_rad: float = 5.5  # ... or nearly once round
+    drift_m_per_m: float = 0.02  # of way, by which a place mapped twice may stand beside itself ...
+    drift_rad_per_m: float = 0.003
+    drift_way_m: float = 80.0  # ... over ways up to this
+    drift_nodes: int = 800
     unknown_m: float = 20.0  # travel after which this is taken for a part of the building not mapped yet
 
 

@@ -21,7 +21,7 @@ from lemtomap.topo.loops.descriptor import describe
 from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
-from lemtomap.topo.loops.places import RASTER_M, Company, PlaceBook, kept
+from lemtomap.topo.loops.places import RASTER_M, Company, PlaceBook, chain, kept
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.types import GridView
 
@@ -94,6 +94,7 @@ class Locator:
         """`is_known` tells the nodes of the map's other parts from those made since the robot got lost."""
         self.config: LocatorConfig = config.locator
         self._loops = config
+        self._graph = graph
         self._index = index
         self._is_known = is_known
         self.places = PlaceBook(graph, config.company_m, config.search_points, kept=128)
@@ -250,6 +251,24 @@ class Locator:
             and abs(off[2]) <= 2.0 * self._loops.agree_rad
         )
 
+    def _same_by_far(self, best: Guess, other: Guess) -> bool:
+        """Tell whether a guess as good as the best is the same place, mapped twice and not yet joined.
+
+        The graph then puts both nodes where the guesses do, up to the drift on the way from one to the other.
+        """
+        if other.fit <= best.fit - self.config.margin:
+            return False
+        reached = self._graph.reach(best.node_id, self.config.drift_way_m, self.config.drift_nodes)
+        if other.node_id not in reached:
+            return False
+        way_m = reached[other.node_id].distance_m
+        expected = compose(best.T_grid_node, chain(reached)[other.node_id])
+        off = between(expected, other.T_grid_node)
+        off_m, off_rad = float(np.hypot(off[0], off[1])), abs(float(off[2]))
+        slack_m = 2.0 * self._loops.agree_m + self.config.drift_m_per_m * way_m
+        slack_rad = 2.0 * self._loops.agree_rad + self.config.drift_rad_per_m * way_m
+        return off_m <= slack_m and off_rad <= slack_rad
+
     def _unite(self) -> None:
         """Keep the best guesses, each once, the one checked longest of those alike."""
         kept: list[Guess] = []
@@ -264,7 +283,9 @@ class Locator:
         if view is None or not self.guesses or not (self._all_heard or self._heard >= config.candidates):
             return None
         best, *others = sorted(self.guesses, key=lambda guess: -guess.fit)
-        lead = best.fit - others[0].fit if others else 1.0
+        rivals = (other for other in others if not self._same_by_far(best, other))
+        rival = next(rivals, None)
+        lead = 1.0 if rival is None else best.fit - rival.fit
         if best.match is None or lead < config.margin or not self._is_sound(best, best.match, view):
             return None
         needed_m = config.moved_m * (0.5 if lead >= config.clear_margin else 1.0)

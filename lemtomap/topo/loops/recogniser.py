@@ -99,7 +99,7 @@ class LoopRecogniser:
         if located is not None:
             self._join(mapper, located)
         elif mapper.lost and mapper.travelled_m - self._lost_m > self.config.locator.unknown_m:
-            mapper.found()
+            mapper.found(known=False)
 
     def _join(self, mapper: "TopoMapper", located: Located) -> None:
         """Join the robot's part of the map to where it was found, and stand there if it is near."""
