@@ -77,6 +77,8 @@ def _reason(error: sqlite3.Error) -> str:
     text = str(error)
     if "full" in text:
         return "the disk is full; the map is safe up to the last second"
+    if "disk I/O" in text:
+        return "the disk refuses to be written or read (is it full?); what was saved before is safe"
     if "readonly" in text or "unable to open" in text:
         return "cannot be written here (read-only file or folder)"
     if "malformed" in text or "not a database" in text:
@@ -169,15 +171,12 @@ def connect_readonly(path: Path) -> sqlite3.Connection:
     What a file at rest leaves out reads as empty.
     """
     with guarded(path):
-        connection = _connect(path, "mode=ro")
         try:
-            held = _tables(connection)
+            connection = _connect(path, "mode=ro")
         except sqlite3.Error:
-            connection.close()
             connection = _connect(path, "mode=ro&immutable=1")
-            held = _tables(connection)
         connection.execute("PRAGMA temp_store = MEMORY")
-        for name in TABLES.keys() - held:
+        for name in TABLES.keys() - _tables(connection):
             connection.execute(f"CREATE TEMP TABLE {name}{TABLES[name]}")
     return connection
 
@@ -191,5 +190,9 @@ def _connect(path: Path, how: str) -> sqlite3.Connection:
     connection = sqlite3.connect(
         uri, uri=True, isolation_level=None, check_same_thread=False, timeout=5.0, cached_statements=64
     )
-    connection.execute("PRAGMA cache_size = -2048")
+    try:
+        connection.execute("PRAGMA cache_size = -2048")  # looks at the file for the first time
+    except sqlite3.Error:
+        connection.close()
+        raise
     return connection

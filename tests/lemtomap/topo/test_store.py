@@ -220,6 +220,35 @@ def test_a_full_disk_is_one_clear_line_and_the_committed_map_stays(tmp_path):
         assert again.node(1) is not None
 
 
+FILLER = """
+import resource, sys
+from pathlib import Path
+from lemtomap.errors import BadMap
+from lemtomap.topo.graph import Place
+from lemtomap.topo.store import TopoStore
+store = TopoStore.create(Path(sys.argv[1]), commit_every_s=0.0)
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+try:
+    for k in range(3000):
+        store.put_place(store.add_node(created_s=float(k)).node_id, Place(float(k), bytes(500)))
+        store.commit()
+        print(k, flush=True)
+except BadMap as error:
+    print(error)
+"""
+
+
+def test_no_room_for_a_growing_file_is_one_clear_line_and_every_commit_stays(tmp_path):
+    path = tmp_path / "a.lemto"
+    command = [sys.executable, "-c", FILLER, str(path)]
+    root = Path(__file__).parents[3]
+    said = subprocess.run(command, capture_output=True, text=True, cwd=root, check=False).stdout  # noqa: S603
+    *written, refusal = said.splitlines()
+    assert refusal.startswith(f"{path}: the disk ")
+    with TopoStore.open(path) as store:
+        assert store.count("node") >= int(written[-1]) + 1 >= 20
+
+
 def test_a_reader_follows_the_writer_and_forgets_only_what_changed(tmp_path):
     path = tmp_path / "a.lemto"
     with TopoStore.create(path) as store:
