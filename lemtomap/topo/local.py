@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lemtomap.se2 import Pose
+from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge
@@ -122,6 +122,7 @@ class LocalMap:
         """Fit the nodes that are not anchored to all edges among them (thesis, Figure 3-7c).
 
         Composed along the shortest ways they start near the answer; where the edges agree nothing is solved.
+        All is done in the frame of the associated node: where the window's frame lies must not show.
         """
         free = [not standing.anchored for standing in settled.values()]
         free[0] = False  # the associated node: the anchor of the whole
@@ -129,13 +130,15 @@ class LocalMap:
             return settled
         index = {node_id: k for k, node_id in enumerate(settled)}
         problem = Problem.of_edges(self._edges_among(settled), index)
-        poses = np.array([standing.T_grid_node for standing in settled.values()])
+        grid_poses = np.array([standing.T_grid_node for standing in settled.values()])
+        poses = between(grid_poses[0], grid_poses)
         if len(problem.ends) == 0 or problem.chi2(poses) < AGREE_CHI2:
             return settled
         solution = solve_local(problem, poses, ~np.array(free), SOLVE_ITERATIONS)
+        solved = compose(grid_poses[0], solution.poses)
         return {
             node_id: replace(standing, T_grid_node=pose) if loose else standing
-            for (node_id, standing), pose, loose in zip(settled.items(), solution.poses, free, strict=True)
+            for (node_id, standing), pose, loose in zip(settled.items(), solved, free, strict=True)
         }
 
     def _edges_among(self, settled: dict[int, Standing]) -> list[Edge]:

@@ -6,11 +6,12 @@ from lemtomap.topo.align import Match
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed, OpeningDone, OpeningSeen
 from lemtomap.topo.graph import OpeningState, Place
+from lemtomap.topo.local import LocalMap
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
-from tests.lemtomap.topo.drive import lead, room, said
+from tests.lemtomap.topo.drive import lead, relative, room, said
 
 SURE = np.diag([1e-4, 1e-4, 1e-5])
 CORRIDORS = [(-9, -9), (9, -9), (9, 9), (-9, 9), (-9, -8.2)]
@@ -38,6 +39,26 @@ def test_a_round_longer_than_d_nn_stays_open_until_a_closure_joins_it(loop):
     loop.store.commit()
     with TopoReader(loop.store.path) as reader:
         assert 1 in {each.other_id for each in reader.edges_of(last)}
+
+
+def test_from_whatever_frame_the_map_is_seen_its_nodes_lie_the_same_way(loop):
+    """Also where edges contradict one another, so that the local solve has work to do."""
+    last = loop.associated_id
+    truth = between(loop.local.standings[last].T_grid_node, pose(-9, -9, 0))
+    loop.close_loop(last, 1, compose(truth, pose(0.2, -0.1, 0.05)), SURE)
+    loop.close_loop(last - 5, 6, compose(truth, pose(5.0, 0.0, 0.0)), SURE)
+    rng, seen = np.random.default_rng(4), []
+    for _ in range(10):
+        local = LocalMap(loop.graph, loop.config)
+        local.anchor(last, rng.uniform([-1000, -1000, -np.pi], [1000, 1000, np.pi]), SURE)
+        local.settle(last)
+        seen.append(relative({i: s.T_grid_node for i, s in local.standings.items()}, last))
+    solved = between(seen[0][1], seen[0][6])
+    assert np.abs(solved - between(*(loop.local.standings[i].T_grid_node for i in (1, 6)))).max() > 1e-3
+    for poses in seen[1:]:
+        assert list(poses) == list(seen[0])
+        for node_id, T in poses.items():
+            np.testing.assert_allclose(between(T, seen[0][node_id]), 0.0, atol=1e-9)
 
 
 def test_a_revoked_closure_leaves_nothing_behind(loop):
