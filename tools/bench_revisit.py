@@ -17,6 +17,7 @@ import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +31,7 @@ from robot.bridge import URG_SILENT_FREE_M
 from robot.logs import open_log
 from sim import worlds
 from sim.carmen import record_tour
+from sim.route import RoutePlanner
 from sim.simulator import Simulator
 from sim.tours import Tour, plan_errand
 from sim.world import Raster, World
@@ -50,6 +52,8 @@ class Findings:
     nodes: int = 0
     map_bytes: int = 0
     place_bytes: float = 0.0
+    detour: float = 0.0
+    """Way over edges from the first node to the one furthest off, over the truly shortest way."""
     cpu_s: float = 0.0
     driven_s: float = 0.0
 
@@ -97,8 +101,10 @@ def judge(world: World, log: Path, folder: Path, config: TopoConfig) -> Findings
     found.nodes = mapper.store.count("node")
     sizes = [len(place.boundary) + len(place.descriptor) for _, place in mapper.store.places()]
     found.place_bytes = float(np.mean(sizes))
+    found.detour = _detour(mapper, born, world)
     mapper.close()
     found.map_bytes = mapper.store.path.stat().st_size
+    print(f"{log.stem}: p99 {np.percentile(found.off_m, 99):.3f} m", file=sys.stderr, flush=True)
     return found
 
 
@@ -116,6 +122,16 @@ def _judge(found: Findings, mapper: TopoMapper, at: Pose, born: dict[int, Pose],
 def _seen(mapper: TopoMapper, node_id: int) -> Pose:
     """Return T_base_node as the map has it."""
     return between(mapper.now[0].T_grid_base, mapper.local.standings[node_id].T_grid_node)
+
+
+def _detour(mapper: TopoMapper, born: dict[int, Pose], world: World) -> float:
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_weighted_edges_from((e.source_id, e.target_id, e.length_m) for e in mapper.store.edges())
+    over_edges = nx.single_source_dijkstra_path_length(graph, 1)
+    goal = max(over_edges, key=lambda node_id: over_edges[node_id])
+    ends = [(float(born[node_id][0]), float(born[node_id][1])) for node_id in (1, goal)]
+    true_m = np.hypot(*np.diff(RoutePlanner(world.raster).path(*ends), axis=0).T).sum()
+    return float(over_edges[goal] / true_m)
 
 
 def _walls_crossed(mapper: TopoMapper, born: dict[int, Pose], raster: Raster) -> tuple[int, int]:
@@ -146,6 +162,7 @@ def report(found: list[Findings]) -> None:
     )
     print(f"localisation data {np.mean([f.place_bytes for f in found]):.0f} bytes a node")
     cpu = sum(f.cpu_s for f in found) / sum(f.driven_s for f in found)
+    print(f"way over edges to the furthest node {np.mean([f.detour for f in found]):.3f} of the shortest way")
     print(f"map {[f.map_bytes for f in found]} bytes; topological part {cpu:.2%} of one core in real time")
 
 
@@ -155,21 +172,22 @@ def main() -> None:
     parser.add_argument("--world", default="office")
     parser.add_argument("--metres", type=float, default=40.0)
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--node-distance", type=float, default=1.0)
+    parser.add_argument("--node-distance", type=float, nargs="+", default=[1.0], help="placements to compare")
     parser.add_argument("--keep", type=Path, default=None, help="where recorded drives are kept")
     args = parser.parse_args()
     world = worlds.load(args.world)
-    config = TopoConfig(new_node_distance_m=args.node_distance)
-    found = []
     with tempfile.TemporaryDirectory() as own:
         folder = args.keep or Path(own)
         folder.mkdir(parents=True, exist_ok=True)
-        for log in record(world, args.metres, args.seeds, folder):
-            found.append(judge(world, log, Path(own), config))
-            print(f"{log.stem}: p99 {np.percentile(found[-1].off_m, 99):.3f} m", file=sys.stderr, flush=True)
-    report(found)
-    worst, pgm_bytes = max(f.map_bytes for f in found), world.raster.occupied.size
-    print(f"the whole plan as PGM: {pgm_bytes} bytes; the map takes {worst / pgm_bytes:.1%} of that")
+        logs = record(world, args.metres, args.seeds, folder)
+        for distance_m in args.node_distance:
+            config = TopoConfig(new_node_distance_m=distance_m)
+            with tempfile.TemporaryDirectory() as maps:
+                found = [judge(world, log, Path(maps), config) for log in logs]
+            print(f"-- a node every {distance_m:g} m at most")
+            report(found)
+            worst, pgm_bytes = max(f.map_bytes for f in found), world.raster.occupied.size
+            print(f"the whole plan as PGM: {pgm_bytes} bytes; the map takes {worst / pgm_bytes:.1%} of that")
 
 
 if __name__ == "__main__":
