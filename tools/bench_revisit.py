@@ -114,9 +114,10 @@ def _judge(found: Findings, mapper: TopoMapper, at: Pose, born: dict[int, Pose],
     found.off_m.append(float(np.hypot(off[0], off[1])))
     found.off_rad.append(abs(float(off[2])))
     found.measured.append(mapper.transform.measured)
-    gap_m = {i: float(np.hypot(*(T[:2] - at[:2]))) for i, T in born.items()}
-    nearest_m = min(m for i, m in gap_m.items() if i == node_id or not crosses(raster, at, born[i]))
-    found.right.append(gap_m[node_id] <= nearest_m + RIGHT_WITHIN_M)
+    away = np.array([T[:2] for T in born.values()]) - at[:2]
+    within_m = float(np.hypot(*(born[node_id][:2] - at[:2]))) - RIGHT_WITHIN_M
+    nearer = [T for T, gap_m in zip(born.values(), np.hypot(*away.T), strict=True) if gap_m < within_m]
+    found.right.append(all(crosses(raster, at, T) for T in nearer))
 
 
 def _seen(mapper: TopoMapper, node_id: int) -> Pose:
