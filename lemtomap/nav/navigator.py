@@ -38,6 +38,8 @@ from lemtomap.types import MapView, RouteGraph, Twist
 
 BUMP_BACK_M = 0.15
 AT_NODE_M = 0.5
+BY_NODE_M = 1.2
+ROUND_SHARE, ROUND_M = 2.0, 3.0
 STAYED_M = 0.4
 REST = Twist(0.0, 0.0)
 
@@ -169,6 +171,11 @@ class Navigator:
         plan, target = self.lookout.plan, self.lookout.target
         if plan is None or target is None:
             return self._no_way(route, moment)
+        if target.final and self._shut_since_s is not None:
+            slower = approach(moment.twist, REST, self.config.body, self.config.period_s)
+            return self._output(
+                moment, slower, NavState.WAITING, Reason.OBSTACLE, "no way to the goal in sight"
+            )
         self._waiting_s = None
         return self._drive(route, plan, target, moment)
 
@@ -206,17 +213,30 @@ class Navigator:
         return self._output(moment, twist, NavState.WAITING, Reason.OBSTACLE, f"{text}: waiting")
 
     def _goal_is_shut(self, route: Route, moment: Moment) -> bool:
-        """Tell whether the robot has stood at the goal's node for a while with no way to the goal itself."""
-        target, at_node = self.lookout.target, False
-        if target is not None and not target.final and target.node_id == route.nodes[-1]:
-            place = moment.map_view.T_grid_node.get(target.node_id)
-            at_node = place is not None and float(np.hypot(*(place - moment.T_grid_base)[:2])) < AT_NODE_M
-        if not at_node:
+        """Tell whether the robot has been at the goal's node for a while with no way to the goal itself."""
+        if not self._is_beside_goal(route, moment):
             self._shut_since_s = None
         elif self._shut_since_s is None:
             self._shut_since_s = moment.now_s
         since_s = self._shut_since_s
         return since_s is not None and moment.now_s - since_s > self.config.recovery.closed_after_s
+
+    def _is_beside_goal(self, route: Route, moment: Moment) -> bool:
+        """Tell whether the robot is at the goal's node and the goal, though near, is not to be reached.
+
+        A long way round over unseen floor to a place beside the node is none: it leads through gaps in walls.
+        """
+        target, plan, goal = self.lookout.target, self.lookout.plan, self._goal
+        place = moment.map_view.T_grid_node.get(route.nodes[-1])
+        if target is None or plan is None or goal is None or place is None or target.beyond_m > 0.0:
+            return False
+        if target.node_id != route.nodes[-1]:
+            return False
+        away_m = float(np.hypot(*(place - moment.T_grid_base)[:2]))
+        if not target.final:
+            return away_m < AT_NODE_M
+        round_m = ROUND_SHARE * float(np.hypot(*goal.p_node)) + ROUND_M
+        return not target.proven and away_m < BY_NODE_M and plan.length_m > round_m
 
     # ---- driving ----
 

@@ -138,10 +138,13 @@ class Lookout:
         return found
 
     def remaining_m(self, route: Route) -> float:
-        """Return the way to the target and along the edges behind it."""
+        """Return the way to the target and along the edges behind it.
+
+        Just after the route changed the old target may not lie on it: then the route is all that is known.
+        """
         plan, target = self.plan, self.target
-        if plan is None or target is None:
-            return route.length_m
+        if plan is None or target is None or target.node_id not in route.nodes:
+            return max(route.length_m, 0.0 if plan is None else plan.length_m)
         return plan.length_m - target.beyond_m + sum(edge.length_m for edge in self.edges_beyond(route))
 
     def edges_beyond(self, route: Route) -> Sequence[RouteEdge]:
