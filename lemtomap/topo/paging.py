@@ -31,6 +31,8 @@ class PagedGraph:
         self._capacity = capacity
         self._nodes: OrderedDict[int, Node] = OrderedDict()
         self._edges: OrderedDict[int, tuple[Edge, ...]] = OrderedDict()
+        self._ways: dict[int, list[tuple[int, float, Edge]]] = {}
+        """Other end, length and edge, of nodes whose edges are in memory and were asked for their ways."""
 
     def node(self, node_id: int) -> Node:
         """Return a node. Raises KeyError for one the map does not have."""
@@ -91,6 +93,7 @@ class PagedGraph:
         for node_id in node_ids:
             self._nodes.pop(node_id, None)
             self._edges.pop(node_id, None)
+            self._ways.pop(node_id, None)
 
     def reach(self, start_id: int, radius_m: float, limit: int = 1 << 30) -> dict[int, Reached]:
         """Return the nodes within a topological distance of one node, nearest first (Dijkstra).
@@ -106,14 +109,21 @@ class PagedGraph:
             if node_id in reached:
                 continue
             reached[node_id] = Reached(node_id, distance_m, via)
-            for edge in self.edges_of(node_id):
-                other_id = edge.other(node_id)
-                further_m = round(distance_m + edge.length_m, 6)  # equal ways tie in every frame
+            for other_id, length_m, edge in self._ways_from(node_id):
+                further_m = round(distance_m + length_m, 6)  # equal ways tie in every frame
                 if further_m <= radius_m and further_m < best.get(other_id, radius_m + 1.0):
                     best[other_id] = further_m
                     pushed += 1
                     heapq.heappush(queue, (further_m, pushed, other_id, edge))
         return reached
+
+    def _ways_from(self, node_id: int) -> list[tuple[int, float, Edge]]:
+        ways = self._ways.get(node_id)
+        if ways is None:
+            edges = self.edges_of(node_id)
+            ways = [(edge.other(node_id), edge.length_m, edge) for edge in edges]
+            self._ways[node_id] = ways
+        return ways
 
     def _keep_node(self, node: Node) -> None:
         self._nodes[node.node_id] = node
@@ -124,5 +134,7 @@ class PagedGraph:
     def _keep_edges(self, node_id: int, edges: tuple[Edge, ...]) -> None:
         self._edges[node_id] = edges
         self._edges.move_to_end(node_id)
+        self._ways.pop(node_id, None)
         while len(self._edges) > self._capacity:
-            self._edges.popitem(last=False)
+            dropped_id, _ = self._edges.popitem(last=False)
+            self._ways.pop(dropped_id, None)

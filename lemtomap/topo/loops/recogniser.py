@@ -33,6 +33,7 @@ class LoopRecogniser:
         """Edge IDs of those that were taken back."""
         self._closer: LoopCloser | None = None
         self._index: PlaceIndex | None = None
+        self._is_behind = True
         self._found: dict[int, Pose] = {}
         self._sure_m = 0.0
         self._lost_m = 0.0
@@ -43,6 +44,7 @@ class LoopRecogniser:
 
     def place_taken(self, node_id: int, place: Place) -> None:  # noqa: ARG002 - read again from the file
         """Take note of a node's localisation data, new or renewed."""
+        self._is_behind = True
         if self._closer is not None:
             self._closer.place_taken(node_id)
 
@@ -58,6 +60,7 @@ class LoopRecogniser:
 
     def at_node(self, mapper: "TopoMapper", *, born: bool) -> None:  # noqa: ARG002
         """Look for known places around a node that was made or became the associated one."""
+        self._is_behind = True  # whatever else changed the file is noticed here
         if mapper.lost:
             return
         slam, grid = mapper.now
@@ -82,7 +85,8 @@ class LoopRecogniser:
 
     def update(self, mapper: "TopoMapper") -> None:
         """Work a slice after each scan; closes loops."""
-        self._index_of(mapper).catch_up()
+        if self._is_behind:
+            self._is_behind = not self._index_of(mapper).catch_up()
         if self.locator is not None:
             self._locate(mapper, self.locator)
         if not mapper.lost:
