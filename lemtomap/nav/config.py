@@ -117,8 +117,6 @@ class ExploreConfig:
     goal_tolerance_m: float = 0.40
     switch_share: float = 0.5  # another opening must cost less than this share of the present one's
     here_price_m: float = 3.0  # an opening beside the robot will mostly be seen in passing
-    small_m: float = 1.0  # an opening smaller than this, a door or a corner, ...
-    small_share: float = 0.5  # ... costs only this share: to come back for it later costs much more
     turn_price_m: float = 1.0  # turning right round costs about this much way
     window_first_m: float = 6.0  # look for openings beyond the window when none in it is nearer than this
     patience_s: float = 240.0  # for one opening, and on top of that its way ...

@@ -77,10 +77,7 @@ def _in_window(
     if np.hypot(dx, dy) <= config.goal_tolerance_m:
         way_m += config.here_price_m
     turn_rad = abs(float(se2.wrap_angle(np.arctan2(dy, dx) - T_grid_base[2])))
-    price_m = way_m + config.turn_price_m * turn_rad / np.pi
-    if opening.width_m < config.small_m:
-        price_m *= config.small_share
-    return price_m if np.isfinite(way_m) else None
+    return way_m + config.turn_price_m * turn_rad / np.pi if np.isfinite(way_m) else None
 
 
 def _by_route(openings: Sequence[Placeholder], here: Here) -> dict[int, float]:
