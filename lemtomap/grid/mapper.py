@@ -187,7 +187,8 @@ class Tracker(ABC):
             starts.append(self._T_grid_base)
         for start in starts:
             rival = self._match(beams, start, slipped, self._window(), config.search_rad)
-            if rival.quality > match.quality + config.rival_gain:
+            sees_all_ways = rival.diversity >= config.degenerate_below  # a lone wall fits any other
+            if sees_all_ways and rival.quality > match.quality + config.rival_gain:
                 match = rival
         return match
 
