@@ -179,7 +179,7 @@ class Experiment:
         minutes, where = drive.duration_s / 60.0, Path(drive.world).name
         text = "\n\n".join(
             [
-                f"{minutes:.0f} minutes through {where}, {self.plan.repetitions} repetitions.",
+                f"{minutes:.0f} minutes through {where}; repetitions: {self.plan.repetitions}.",
                 published.CURVES[drive.name],
                 published.MAPS[drive.name],
                 "How memory and load go on at the end of the drive:",
