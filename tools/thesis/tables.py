@@ -38,7 +38,10 @@ def resources(systems: Sequence[System], readings: Readings) -> str:
     told = [(readings[s.key].closures, readings[s.key].wrong_closures) for s in systems]
     wrong = ["-" if s is BASELINE else f"{b} of {a}" for s, (a, b) in zip(systems, told, strict=True)]
     rows.append(["wrong loop closures, all repetitions", *wrong, *("" for _ in systems[:-1])])
-    spread = [f"± {np.ptp(readings[s.key].cpu_s) / 2.0:.1f}" for s in systems]
+    spread = [
+        f"± {np.ptp(each) / 2.0:.1f}" if len(each) > 1 else "-"
+        for each in (readings[s.key].cpu_s for s in systems)
+    ]
     rows.insert(1, ["spread of the repetitions, s", *spread, *("" for _ in systems[:-1])])
     header = ["", *(s.title for s in systems), *(f"{s.title} against baseline" for s in systems[:-1])]
     return table(header, rows)
