@@ -99,3 +99,54 @@ def _across(left, right):
         return math.nan
     off_m = abs(left[0] * right[1] - left[1] * right[0]) / length
     return math.nan if off_m > 0.03 else math.atan2(chord[1], chord[0]) + math.pi / 2
+
+
+def normal_equations(beams, pose, window, normals, sigma_m, point_weight):
+    """Return H (3, 3), b (3,) and the sum of weights of the point-to-line match, point by point."""
+    n, size = window.cells, window.resolution_m
+    arrays = window.arrays
+    occupied = [cell for cell, evidence in cells_of(window).items() if evidence > 0]
+    H, b, total = np.zeros((3, 3)), np.zeros(3), 0.0
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for (px, py), seen_rad in zip(np.asarray(beams.hits, dtype=float), beams.normals_rad, strict=True):
+        arm = np.array([c * px - s * py, s * px + c * py])
+        point = arm + pose[:2]
+        here = tuple(math.floor(v / size) for v in point)
+        gx, gy = min(occupied, key=lambda cell, here=here: _nearness(cell, here))
+        if _nearness((gx, gy), here)[0] > 79:  # beyond the 254 nearest steps
+            continue
+        at = gy % n, gx % n
+        error = (np.array([gx, gy]) + arrays.mean[at] / 65535.0) * size - point
+        weight = math.exp(-0.5 * float(error @ error) / sigma_m**2)
+        total += weight
+        code = int(arrays.normal[at])
+        if code != 255:
+            axes, strength = [normals[code].astype(float)], weight
+            error = error + arrays.lift[at] / 254.0 * size * axes[0]
+        elif not math.isnan(seen_rad):
+            angle = float(seen_rad) + pose[2]
+            axes, strength = [np.array([math.cos(angle), math.sin(angle)])], weight
+        else:
+            axes, strength = [np.array([1.0, 0.0]), np.array([0.0, 1.0])], point_weight * weight
+        for axis in axes:
+            row = np.array([axis[0], axis[1], axis @ np.array([-arm[1], arm[0]])])
+            H += strength * np.outer(row, row)
+            b += strength * row * float(axis @ error)
+    return H, b, total
+
+
+def _nearness(cell, here):
+    dx, dy = cell[0] - here[0], cell[1] - here[1]
+    return dx * dx + dy * dy, abs(dx) + abs(dy), (dx, dy)
+
+
+def gated(H, b, gate):
+    """Return H and b with the weak axis of the surfaces weighed by 0 at the gate to 1 at twice the gate."""
+    spread, axes = np.linalg.eigh(H[:2, :2])
+    diversity = 2.0 * spread[0] / spread.sum()
+    kept = min(max(diversity / gate - 1.0, 0.0), 1.0)
+    weak = np.outer(axes[:, 0], axes[:, 0])
+    P, Q = np.eye(3), np.eye(3)
+    P[:2, :2] -= (1.0 - math.sqrt(kept)) * weak
+    Q[:2, :2] -= (1.0 - kept) * weak
+    return P @ H @ P, Q @ b, diversity

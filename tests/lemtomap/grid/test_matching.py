@@ -1,0 +1,58 @@
+import math
+
+import numpy as np
+import pytest
+
+from lemtomap.grid import SlamConfig
+from lemtomap.grid.matching import Matcher
+from lemtomap.grid.matching import kernels as matching
+from lemtomap.grid.scan import ScanPreparer
+from lemtomap.grid.window import Scratch, Window, look_up
+from lemtomap.types import Odometry
+from tests.lemtomap.grid import naive
+from tests.lemtomap.grid.rooms import box, scan_at
+
+CONFIG = SlamConfig(window_m=4.0, max_range_m=2.0)
+TABLES = look_up(CONFIG.resolution_m)
+ROOM = [*box(-1.53, -1.27, 1.61, 1.18), *box(0.4, 0.3, 0.7, 0.52)]
+
+
+def beams_at(pose, beams=60):
+    return ScanPreparer()(scan_at(pose, ROOM, beams=beams, range_max_m=2.0), Odometry(0.0, np.zeros(3)), 2.0)
+
+
+def filled(beams=60):
+    window = Window(CONFIG, TABLES, Scratch(CONFIG.cells))
+    for pose in ((0.0, 0.0, 0.1), (0.21, -0.13, 1.0), (-0.4, 0.33, -2.0)):
+        window.integrate(beams_at(pose, beams), np.array(pose))
+    return window
+
+
+@pytest.mark.parametrize("beams", [25, 120])  # few beams: many cells have no plane of their own
+def test_the_normal_equations_are_the_twin_s(beams):
+    window, pose = filled(beams), np.array([0.05, -0.04, 0.32])
+    seen = beams_at((0.07, -0.02, 0.3), beams)
+    rules = Matcher(CONFIG, TABLES)._rules
+    H, b = np.empty((3, 3)), np.empty(3)
+    total = matching._linearise(
+        seen.hits, seen.normals_rad, pose, window.arrays, TABLES, rules, CONFIG.match_sigma_m, H, b
+    )
+    wanted = naive.normal_equations(
+        seen, pose, window, TABLES.normals, CONFIG.match_sigma_m, CONFIG.point_weight
+    )
+    assert wanted[2] > 0.3 * len(seen.hits)
+    assert pytest.approx(wanted[0], rel=1e-4, abs=1e-3) == H
+    assert pytest.approx(wanted[1], rel=1e-3, abs=1e-4) == b
+    assert total == pytest.approx(wanted[2], rel=1e-4)
+
+
+@pytest.mark.parametrize("across", [0.5, 4.0, 6.0, 30.0])
+def test_the_gate_weighs_only_the_weak_axis_and_does_so_bit_by_bit(across):
+    c, s = math.cos(0.4), math.sin(0.4)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    H = turn @ np.array([[100.0, 0.0, 7.0], [0.0, across, 2.0], [7.0, 2.0, 50.0]]) @ turn.T
+    b = np.array([0.3, -0.7, 0.2])
+    H_wanted, b_wanted, diversity = naive.gated(H, b, 0.08)
+    assert matching._gate(H, b, 0.08) == pytest.approx(diversity)
+    assert pytest.approx(H_wanted, abs=1e-9) == H
+    assert pytest.approx(b_wanted, abs=1e-9) == b
