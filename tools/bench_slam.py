@@ -1,9 +1,9 @@
 """Accuracy, spread, CPU and memory of the metric layer: the whole table, each figure with its seeds.
 
     lemtomap bench slam [--data DIR] [--quick]       everything; a quarter of an hour on a quiet core
-    lemtomap bench slam --parts corridor kernels     some of it: logs corridor drives kernels real-time memory
+    lemtomap bench slam corridor kernels             some of it: logs corridor drives kernels real-time memory
                                                      first-use
-    lemtomap bench slam --parts logs --slam window --seeds 20
+    lemtomap bench slam logs --slam window --seeds 20
 
 DIR holds LOG.clf.xz and LOG.relations of the recorded logs; without it that part is left out and said so.
 A seed also moves the start: seed s begins at scan 7 s, so that single-hypothesis runs differ too. Poses are
@@ -26,7 +26,7 @@ def _options(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="lemtomap bench slam", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--parts", nargs="+", choices=list(PARTS), default=list(PARTS))
+    parser.add_argument("parts", nargs="*", help=f"some of {', '.join(PARTS)}; none: all")
     parser.add_argument("--data", type=Path, default=Path("../shared/data/carmen"))
     parser.add_argument("--slam", nargs="+", choices=sorted(SLAMS), default=sorted(SLAMS))
     parser.add_argument("--logs", nargs="+", default=["intel", "aces"])
@@ -39,6 +39,10 @@ def _options(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="few seeds, short drives, growing map left out")
     parser.add_argument("--out", type=Path, help="Markdown file to leave the table in")
     options = parser.parse_args(arguments)
+    unknown = [part for part in options.parts if part not in PARTS]
+    if unknown:
+        parser.error(f"'{unknown[0]}' is none of {', '.join(PARTS)}")
+    options.parts = options.parts or list(PARTS)
     options.drive_seeds, options.drive_s, options.grown_s = 3, 200.0, 600.0
     if options.quick:
         options.seeds = options.seeds or 2
