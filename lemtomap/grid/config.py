@@ -68,7 +68,8 @@ class SlamConfig:
     renew_rad: float = 2.0
 
     # particles
-    sample_share: float = 1.0  # of the proposal's standard deviation that is sampled
+    sample_share: float = 0.1  # of the proposal's standard deviation that is sampled: a window closes no loop
+    grown_sample_share: float = 1.0  # on a growing map, where a loop may close
     weight_per_quality: float = (
         10.0  # log weight for the whole step from quality 0 to 1: beams err together, and
     )

@@ -48,6 +48,7 @@ class RollingGmapping(Tracker):
         self._windows = [self._new_window() for _ in range(config.particles)]
         self._particles = [Particle(np.zeros(3), 0.0, self._windows[0]) for _ in range(config.particles)]
         self._best = 0
+        self._sample_share = config.sample_share
 
     def particles(self) -> NDArray[np.float64]:
         """Return float64 (N, 3), T_grid_base of each particle now."""
@@ -96,7 +97,7 @@ class RollingGmapping(Tracker):
     def _draw(self, match: Match) -> Pose:
         """Return a pose from the Gaussian around the match, fused with the motion prior."""
         noise = np.linalg.cholesky(match.covariance) @ self._rng.standard_normal(3)
-        return np.asarray(match.T_grid_base + self.config.sample_share * noise)
+        return np.asarray(match.T_grid_base + self._sample_share * noise)
 
     def _own_window(self, particle: Particle) -> None:
         """Give the particle a window of its own before it is written (copy on write)."""

@@ -107,6 +107,7 @@ class GrowingGmapping(RollingGmapping):
         tile_m = TILE * config.resolution_m
         whole = replace(config, window_m=math.ceil(config.window_m / tile_m + 1.0 - 1e-9) * tile_m)
         super().__init__(replace(whole, max_range_m=config.usable_range_m(config.window_m)), seed)
+        self._sample_share = config.grown_sample_share
         self._visits = 0
         self._since: list[tuple[int, Pose]] = []  # per scan: visits so far, and the motion since the last
 

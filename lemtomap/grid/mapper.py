@@ -60,6 +60,7 @@ class Tracker(ABC):
         self._beams: Beams | None = None
         self._pending = np.zeros(3)  # odometry since the last match
         self._T_odom_base = np.zeros(3)
+        self._moves = False
         self._stamp_s = 0.0
         self._T_grid_integrated = np.zeros(3)
         self._integrated_s = -math.inf
@@ -103,7 +104,10 @@ class Tracker(ABC):
         self._T_odom_base = odometry.T_odom_base
         self._pending = compose(self._pending, step)
         predicted = compose(self._T_grid_base, self._pending)
-        if not self._is_due_to_match(scan.stamp_s):
+        # wheels whose stamps jitter may say that a robot in motion stood for a moment
+        due = self._moves or self._is_due_to_match(scan.stamp_s)
+        self._moves = self._is_motion(step)
+        if not due:
             return self._report(predicted, matched=False, integrated=False)
         match = self._track(beams, predicted, abs(float(step[2])))
         self._quality, self._diversity, self._covariance = match.quality, match.diversity, match.covariance
@@ -111,6 +115,7 @@ class Tracker(ABC):
             if self._window().known_share(beams, predicted) > self.config.new_ground_below:
                 return self._report(predicted, matched=False, integrated=False)
             match = refused(predicted, odometry_uncertainty(self._pending, self.config))
+        self._moves = self._is_motion(between(self._T_grid_base, match.T_grid_base))
         self._T_grid_base, self._information = match.T_grid_base, match.information
         self._pending = np.zeros(3)
         integrated = self._is_due_to_integrate(scan.stamp_s)
@@ -142,12 +147,12 @@ class Tracker(ABC):
         return self._report(self._T_grid_base, matched=False, integrated=True)
 
     def _is_due_to_match(self, stamp_s: float) -> bool:
-        x, y, yaw = self._pending.tolist()
-        return (
-            math.hypot(x, y) >= self.config.match_distance_m
-            or abs(yaw) >= self.config.match_turn_rad
-            or abs(stamp_s - self._integrated_s) >= self.config.integrate_period_s
-        )
+        waited_s = abs(stamp_s - self._integrated_s)
+        return self._is_motion(self._pending) or waited_s >= self.config.integrate_period_s
+
+    def _is_motion(self, step: Pose) -> bool:
+        x, y, yaw = step.tolist()
+        return math.hypot(x, y) >= self.config.match_distance_m or abs(yaw) >= self.config.match_turn_rad
 
     def _is_due_to_integrate(self, stamp_s: float) -> bool:
         assert self._T_grid_base is not None  # noqa: S101
@@ -172,7 +177,8 @@ class Tracker(ABC):
         elif match.accepted and math.hypot(self._pending[0], self._pending[1]) > config.match_distance_m:
             change = match.T_grid_base - predicted
             self._trust.learn(change, float(predicted[2]), match.information, expected)
-        self._usual_quality += config.quality_memory * (match.quality - self._usual_quality)
+        share = config.quality_memory if self._usual_quality else 1.0
+        self._usual_quality += share * (match.quality - self._usual_quality)
         return match
 
     def _look_round(self, beams: Beams, match: Match, predicted: Pose, *, leapt: bool) -> Match:
@@ -185,12 +191,11 @@ class Tracker(ABC):
         starts = [] if leapt else [predicted]
         if math.hypot(self._pending[0], self._pending[1]) > config.search_m:
             starts.append(self._T_grid_base)
-        for start in starts:
-            rival = self._match(beams, start, slipped, self._window(), config.search_rad)
-            sees_all_ways = rival.diversity >= config.degenerate_below  # a lone wall fits any other
-            if sees_all_ways and rival.quality > match.quality + config.rival_gain:
-                match = rival
-        return match
+        rivals = [self._match(beams, start, slipped, self._window(), config.search_rad) for start in starts]
+        # a lone wall fits any other
+        sharp = [rival for rival in rivals if rival.diversity >= config.degenerate_below]
+        best = max(sharp, key=lambda rival: rival.quality, default=match)
+        return best if best.quality > match.quality + config.rival_gain else match
 
     def _step_covariance(self, T_grid_base: Pose) -> NDArray[np.float64]:
         """Return how far the motion since the previous report may be wrong.
