@@ -98,17 +98,16 @@ def paired(revision: str, log: Path, pairs: int, slam: str) -> str:
     here = Path(__file__).resolve().parents[1]
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder) / "old"
-        _git(here, "worktree", "add", "--detach", str(there), revision)
-        try:
-            found: dict[Path, list[dict[str, Any]]] = {here: [], there: []}
-            for pair in range(-1, pairs):  # the first one compiles
-                for root in (there, here) if pair % 2 else (here, there):
-                    told = _map(root, log, Path(folder) / "out", slam)
-                    if pair >= 0:
-                        found[root].append(told)
-                print(f"pair {max(pair, 0) + (pair >= 0)} of {pairs}", file=sys.stderr, flush=True)
-        finally:
-            _git(here, "worktree", "remove", "--force", str(there))
+        commit = _git(here, "rev-parse", "--verify", f"{revision}^{{commit}}")
+        _git(here, "clone", "--quiet", "--shared", str(here), str(there))
+        _git(there, "checkout", "--quiet", "--detach", commit)
+        found: dict[Path, list[dict[str, Any]]] = {here: [], there: []}
+        for pair in range(-1, pairs):  # the first one compiles
+            for root in (there, here) if pair % 2 else (here, there):
+                told = _map(root, log, Path(folder) / "out", slam)
+                if pair >= 0:
+                    found[root].append(told)
+            print(f"pair {pair + 1} of {pairs}", file=sys.stderr, flush=True)
     rows = []
     for name, of in MEASURES.items():
         old, new = ([float(of(told)) for told in found[root]] for root in (there, here))
@@ -133,13 +132,15 @@ def _map(root: Path, log: Path, out: Path, slam: str) -> dict[str, Any]:
     return told
 
 
-def _git(root: Path, *arguments: str) -> None:
+def _git(root: Path, *arguments: str) -> str:
+    """Return what git says. Raises ValueError with its reason."""
     git = shutil.which("git") or "git"
     done = subprocess.run(  # noqa: S603 - git itself
         [git, "-C", str(root), *arguments], check=False, capture_output=True, text=True
     )
     if done.returncode:
-        raise SystemExit(f"git {arguments[0]}: {done.stderr.strip().splitlines()[-1]}")
+        raise ValueError(f"git {arguments[0]} {arguments[-1]}: {done.stderr.strip().splitlines()[-1]}")
+    return done.stdout.strip()
 
 
 def main(arguments: list[str]) -> int:
