@@ -35,6 +35,7 @@ LANE_M = 100.0
 GAP_M = 3.0
 STEP_M = 0.35
 TIMED = 3000
+WARM_SCANS = 30  # before a kill: the writer is past compiling
 PLACE_BYTES, DESCRIPTOR_BYTES = 190, 18  # means over Intel, ACES and Killian
 PLACES = 50  # different ones in the synthetic map
 NEAR_PER_NODE = 1.0
@@ -200,7 +201,7 @@ def kill(args: argparse.Namespace) -> None:
         command = [sys.executable, "-c", WRITER, str(path), str(clock), str(1000.0 * k)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:  # noqa: S603
             assert writer.stdout is not None  # noqa: S101
-            first = writer.stdout.readline()
+            first = [writer.stdout.readline() for _ in range(WARM_SCANS)][-1]
             time.sleep(float(rng.uniform(0.0, 1.0)))
             os.kill(writer.pid, signal.SIGKILL)
             clock = float((first + writer.stdout.read()).split("\n")[-2])
