@@ -107,6 +107,28 @@ def test_a_carried_robot_says_so_and_finds_itself_again(mapped):
     robot.close()
 
 
+def test_a_part_that_nothing_joins_is_joined_when_the_robot_comes_by(mapped, tmp_path):
+    world, path, born = mapped
+    own = tmp_path / "own.lemto"
+    shutil.copy(path, own)
+    with TopoStore.open(own, durable=False) as store:
+        west = {node_id for node_id, T_world_node in born.items() if T_world_node[0] < 8.0}
+        for edge in list(store.edges()):
+            if (edge.source_id in west) != (edge.target_id in west):
+                store.delete_edge(edge.edge_id)
+    robot = SimRobot(world, seed=2)
+    robot.put(np.array([13.0, 5.0, 3.1]))
+    mapping = Mapping(robot, own, dict(born))
+    mapping.take(robot.stand(1.0))
+    mapping.take(robot.drive(Tour(RoutePlanner(world.raster).path((13.0, 5.0), (3.0, 5.0)))))
+    mapper = mapping.step.mapper
+    assert not mapping.view.lost
+    assert len(mapper.graph.reach(mapping.view.associated_id, 1e9)) == mapper.store.count("node")
+    assert mapping.off_m(mapping.view.associated_id) < 0.1
+    mapping.step.close()
+    robot.close()
+
+
 def test_a_robot_sent_to_a_place_looks_round_finds_itself_and_goes_there(mapped, tmp_path):
     world, path, born = mapped
     own = tmp_path / "own.lemto"

@@ -42,6 +42,8 @@ class LoopCloser:
         self.work = 0
         self.confirmed: list[Confirmed] = []
         self._outlook: Outlook | None = None
+        self._counted: Outlook | None = None
+        self._apart = False
         self._since_outlook = 0
         self._tasks: deque[Task] = deque()
         self._tried: dict[int, float] = {}
@@ -60,12 +62,20 @@ class LoopCloser:
         self._outlook = None
         self.places.forget()
 
-    @property
-    def parts_known(self) -> int | None:
-        """How many nodes are joined to the robot's; None while that is not known or they are too many."""
+    def is_joined(self, node_id: int) -> bool:
+        """Tell whether a node hangs together with the robot's; True while that is not known."""
         outlook = self._outlook
-        known = outlook is not None and outlook.done and len(outlook) < self.config.gate.outlook_nodes
-        return len(outlook) if known and outlook is not None else None
+        return outlook is None or not outlook.done or node_id in outlook
+
+    def sees_parts_apart(self) -> bool:
+        """Tell whether the map has parts not joined to the robot's; asked once for each outlook."""
+        outlook = self._outlook
+        if outlook is None or not outlook.done or len(outlook) >= self.config.gate.outlook_nodes:
+            return False
+        if self._counted is not outlook:
+            self._counted = outlook
+            self._apart = self.graph.store.count("node") > len(outlook)
+        return self._apart
 
     def at_node(self, situation: Situation, points_grid: NDArray[np.float64]) -> None:
         """Look for known places here: call when a node was made or became the associated one.

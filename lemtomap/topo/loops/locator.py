@@ -126,9 +126,8 @@ class Locator:
         if view.has_structure and not self._queue and self._search is None:
             self._line_up(view)
 
-    def update(self) -> Located | None:
-        """Search on for a slice; return where the robot is once that is certain."""
-        budget = self.config.budget
+    def update(self, budget: int) -> Located | None:
+        """Search on for a slice (bound evaluations); return where the robot is once that is certain."""
         while budget > 0 and (self._search is not None or self._queue):
             budget -= self._work(budget)
         return self._certain()

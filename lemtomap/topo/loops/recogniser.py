@@ -1,5 +1,6 @@
 """What the mapper talks to: places in, closures out (thesis, section 3-3-2: the explicit check)."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,9 +55,10 @@ class LoopRecogniser:
         self._of(mapper).restart()
         self._found.clear()
         self._lost_m = mapper.travelled_m
-        self.locator = Locator(
-            self.config, mapper.graph, self._index_of(mapper), lambda node_id: node_id < part_id
-        )
+        self.locator = self._locator(mapper, lambda node_id: node_id < part_id)
+
+    def _locator(self, mapper: "TopoMapper", is_known: Callable[[int], bool]) -> Locator:
+        return Locator(self.config, mapper.graph, self._index_of(mapper), is_known)
 
     def at_node(self, mapper: "TopoMapper", *, born: bool) -> None:  # noqa: ARG002
         """Look for known places around a node that was made or became the associated one."""
@@ -87,10 +89,17 @@ class LoopRecogniser:
         """Work a slice after each scan; closes loops."""
         if self._is_behind:
             self._is_behind = not self._index_of(mapper).catch_up()
-        if self.locator is not None:
-            self._locate(mapper, self.locator)
         if not mapper.lost:
             self._close(mapper)
+            self._watch_other_parts(mapper)
+        if self.locator is not None:
+            self._locate(mapper, self.locator)
+
+    def _watch_other_parts(self, mapper: "TopoMapper") -> None:
+        """Look beside the mapping for parts of the map that nothing joins to the robot's yet."""
+        closer = self._of(mapper)
+        if self.locator is None and closer.sees_parts_apart():
+            self.locator = self._locator(mapper, lambda node_id: not closer.is_joined(node_id))
 
     def _locate(self, mapper: "TopoMapper", locator: Locator) -> None:
         """Look for the robot in the rest of the map; join the two when it is found."""
@@ -99,7 +108,7 @@ class LoopRecogniser:
             x, y = slam.T_grid_base[:2].tolist()
             points = mapper.keeper.hits.around((x, y), HITS_REACH_M, grid, mapper.config.occupied_from)
             locator.look(Look(slam.T_grid_base, mapper.travelled_m, mapper.turned_rad, grid, points))
-        located = locator.update()
+        located = locator.update(self.config.locator.budget if mapper.lost else self.config.budget)
         if located is not None:
             self._join(mapper, located)
         elif mapper.lost and mapper.travelled_m - self._lost_m > self.config.locator.unknown_m:
@@ -129,7 +138,7 @@ class LoopRecogniser:
         self._of(mapper).audit.commit([edge], support=evidence)
         at = mapper.now[0].T_grid_base
         gap_m = float(np.hypot(located.T_grid_node[0] - at[0], located.T_grid_node[1] - at[1]))
-        if gap_m <= mapper.config.new_node_distance_m:
+        if mapper.lost and gap_m <= mapper.config.new_node_distance_m:
             mapper.relocate(located.node_id, located.T_grid_node, located.covariance)
         self._anchor(mapper, Confirmed(located.node_id, located.T_grid_node, located.covariance))
         self._of(mapper).restart()
