@@ -58,9 +58,9 @@ class MappingStep:
             self.mapper.apply(event)
         update = self.slam.update(timed.scan, timed.odometry)
         moved = self._watch.displaced(update, timed.odometry)
-        if moved:
+        if moved:  # this scan may show both places: the new window begins with the next
             self._lose(stamp_s, moved)
-            update = self.slam.update(timed.scan, timed.odometry)
+            return
         self.mapper.fit = self._watch.fit
         self.mapper.update(update, self.slam.view(), timed.sighting.hits_base)
         self.scans += 1
