@@ -383,7 +383,8 @@ class TopoMapper:
         if self.lost:
             return 0.0
         measured = self._transform.measured
-        return pose_quality(self._drift, self.fit, measured=measured, config=self.config.watch)
+        born = self.local.standings[self._associated_id].born
+        return pose_quality(self._drift, self.fit, born=born, measured=measured, config=self.config.watch)
 
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""

@@ -36,7 +36,8 @@ class WatchConfig:
     carried_s: float = 1.0  # wheels in the air for so long: carried; shorter ones are door sills
 
     inflate: float = 2.0  # of the standard deviations: errors of one match after another are not independent
-    floor_m: float = 0.025  # ... and what stays even then: the quantisation of what is stored
+    floor_m: float = 0.025  # ... and what stays even then, at a node made in this window,
+    known_floor_m: float = 0.05  # ... and at one known before: the map is bent, and walls repeat themselves
     floor_rad: float = math.radians(0.5)
     doubted: float = 0.6  # quality of a pose that the window does not bear out, at most
     good_fit: float = 0.85  # of the usual quality: nothing to doubt
@@ -87,13 +88,16 @@ class Watch:
         return "what the laser sees does not fit any more" if lasts_s >= config.misfit_s else ""
 
 
-def pose_quality(covariance: Covariance, fit: float, *, measured: bool, config: WatchConfig) -> float:
+def pose_quality(
+    covariance: Covariance, fit: float, *, born: bool, measured: bool, config: WatchConfig
+) -> float:
     """Return how likely a pose is right within 10 cm and 2 degrees, 0 to 1.
 
     covariance: float64 (3, 3) of the pose relative to its node, m, m, rad; fit: of the latest scan, as a
-    share of the usual; measured: the window bears the node's place out.
+    share of the usual; born: the node was made in this window; measured: the window bears its place out.
     """
-    variance_m2 = config.inflate**2 * float(np.linalg.eigvalsh(covariance[:2, :2])[-1]) + config.floor_m**2
+    floor_m = config.floor_m if born else config.known_floor_m
+    variance_m2 = config.inflate**2 * float(np.linalg.eigvalsh(covariance[:2, :2])[-1]) + floor_m**2
     variance_rad2 = config.inflate**2 * float(covariance[2, 2]) + config.floor_rad**2
     near = 1.0 - math.exp(-(RIGHT_M**2) / (2.0 * variance_m2))
     straight = math.erf(RIGHT_RAD / math.sqrt(2.0 * variance_rad2))

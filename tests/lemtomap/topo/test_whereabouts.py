@@ -47,9 +47,10 @@ def test_people_may_stand_in_the_way_for_a_moment_but_not_for_good():
 
 def test_quality_falls_with_doubt_misfit_and_an_unproven_place():
     config = WatchConfig()
-    best = pose_quality(SURE, 1.0, measured=True, config=config)
+    best = pose_quality(SURE, 1.0, born=True, measured=True, config=config)
     assert best > 0.95
-    assert pose_quality(SURE * 25, 1.0, measured=True, config=config) < 0.5
-    assert pose_quality(SURE, 0.6, measured=True, config=config) < 0.3
-    assert pose_quality(SURE, 1.0, measured=False, config=config) < 0.9
-    assert pose_quality(np.diag([1e-4, 1e-4, 0.03**2]), 1.0, measured=True, config=config) < 0.6
+    assert 0.7 < pose_quality(SURE, 1.0, born=False, measured=True, config=config) < 0.9
+    assert pose_quality(SURE * 25, 1.0, born=True, measured=True, config=config) < 0.5
+    assert pose_quality(SURE, 0.6, born=True, measured=True, config=config) < 0.3
+    assert pose_quality(SURE, 1.0, born=True, measured=False, config=config) < 0.9
+    assert pose_quality(np.diag([1e-4, 1e-4, 0.03**2]), 1.0, born=True, measured=True, config=config) < 0.6
