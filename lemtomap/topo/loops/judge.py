@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from lemtomap.se2 import between
-from lemtomap.topo.graph import chain_covariance
+from lemtomap.topo.graph import Covariance, chain_covariance
 from lemtomap.topo.loops.cases import Task, reversed_covariance
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Sighting
@@ -46,6 +48,8 @@ class Judge:
         covariance = chain_covariance(
             reversed_covariance(here.T_grid_here, here.covariance), match.T_grid_place, match.covariance
         )
+        if match.weakest < self.config.corridor:
+            covariance = covariance + self._along(match)
         informs = here.here_id in here.measured and here.here_id != task.node_id
         return Sighting(
             task.node_id,
@@ -58,8 +62,14 @@ class Judge:
             self._evidence(task, match),
         )
 
+    def _along(self, match: Match) -> Covariance:
+        """Return what a match in a corridor is unsure of along it, beyond its own figures."""
+        along = np.zeros(3)
+        along[:2] = np.linalg.eigh(match.covariance[:2, :2])[1][:, -1]
+        return np.asarray(self.config.corridor_sigma_m**2 * np.outer(along, along))
+
     def _evidence(self, task: Task, match: Match) -> float:
-        """Return how much a sighting counts: half for each reason to think that it may be chance.
+        """Return how much a sighting counts: less for each reason to think that it may be chance.
 
         Along a corridor a place is told by a few door frames, and they repeat; the next metre of travel
         sees the same frames again, so that only more of the way can tell.
@@ -67,12 +77,9 @@ class Judge:
         config = self.config
         company = self.places.company(task.node_id)
         found = 0.0 if company is None else task.reference.found_in(company.points_node, match.T_grid_place)
-        doubts = [
-            match.weakest < config.corridor,
-            task.box.surprise(match.T_grid_place) > config.surprise,
-            found < config.found,
-        ]
-        return float(0.5 ** sum(doubts))
+        along = config.corridor_weight if match.weakest < config.corridor else 1.0
+        doubts = [task.box.surprise(match.T_grid_place) > config.surprise, found < config.found]
+        return float(along * 0.5 ** sum(doubts))
 
     def contradicts(self, task: Task) -> bool:
         """Tell whether the window shows something else where a belief says that a place must be."""
