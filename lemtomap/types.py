@@ -88,6 +88,9 @@ class SlamUpdate:
     """False: the match was refused or there was nothing to match; the pose follows odometry."""
     integrated: bool
     """True: the scan went into the window."""
+    known: float = 1.0
+    """Share of the hits on ground that the window knows, 0..1: the rest can neither fit nor misfit. 0 with
+    too little in sight to match."""
     jumped: bool = False
     """True: T_grid_odom moved by more than the smooth limit on purpose (relocalisation)."""
 

@@ -9,7 +9,7 @@ from lemtomap.nav.config import NavConfig
 from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.types import Goal, NavState
 from lemtomap.se2 import between
-from robot.exchange import MissionState
+from lemtomap.topo.events import NothingKnownHere
 from robot.missions import Moment, Order
 
 REST_S = 2.0  # whoever put the robot down has time to step back
@@ -28,7 +28,7 @@ class Finder:
         self._explorer: Explorer | None = None
 
     def step(self, moment: Moment) -> Order:
-        """Return where to go next; fails when everything within reach was seen and nothing is known."""
+        """Return where to go next; when all within reach was seen and nothing is known, tell the map so."""
         if moment.now_s - self._since_s < REST_S:
             return Order(text=LOOKING)
         if self._turning(moment):
@@ -62,5 +62,5 @@ class Finder:
             moment.view, moment.graph, moment.output, moment.T_odom_base, moment.now_s
         )
         if found.done:
-            return Order(MissionState.FAILED, "lost: nothing within reach looks like the map", cancel=True)
+            return Order(text=LOOKING, cancel=True, events=(NothingKnownHere(),))
         return Order(text=LOOKING, goal=found.goal)

@@ -65,7 +65,7 @@ class Tracker(ABC):
         self._T_grid_integrated = np.zeros(3)
         self._integrated_s = -math.inf
         self._diversity = 0.0
-        self._quality = 0.0
+        self._quality, self._known = 0.0, 1.0
         self._usual_quality = 0.0
         self._covariance = self._information = np.zeros((3, 3))
         self._reported: Pose | None = None
@@ -112,7 +112,7 @@ class Tracker(ABC):
         match = self._track(beams, predicted, abs(float(step[2])))
         self._quality, self._diversity, self._covariance = match.quality, match.diversity, match.covariance
         if not match.accepted:
-            if self._window().known_share(beams, predicted) > self.config.new_ground_below:
+            if len(beams.hits) == 0 or self._known > self.config.new_ground_below:
                 return self._report(predicted, matched=False, integrated=False)
             match = refused(predicted, odometry_uncertainty(self._pending, self.config))
         self._moves = self._is_motion(between(self._T_grid_base, match.T_grid_base))
@@ -172,7 +172,12 @@ class Tracker(ABC):
         uncertainty = self._trust.widen(expected)
         leapt = turn_rad > config.large_turn_rad
         match = self._match(beams, predicted, uncertainty, window, config.search_rad if leapt else 0.0)
-        if match.quality < config.collapse_share * self._usual_quality:
+        poor = match.quality < config.good_share * self._usual_quality
+        self._known = self._window().known_share(beams, predicted) if poor else 1.0
+        # after a leap, what ground lies under the hits is chance; else new ground speaks against no pose
+        chance = leapt or math.hypot(self._pending[0], self._pending[1]) > config.search_m
+        wanted = self._usual_quality * (1.0 if chance else self._known)
+        if match.quality < config.collapse_share * wanted:
             match = self._look_round(beams, match, predicted, leapt=leapt)
         elif match.accepted and math.hypot(self._pending[0], self._pending[1]) > config.match_distance_m:
             change = match.T_grid_base - predicted
@@ -213,6 +218,7 @@ class Tracker(ABC):
 
     def _report(self, T_grid_base: Pose, *, matched: bool, integrated: bool) -> SlamUpdate:
         T_grid_odom, jumped = self._correction.follow(T_grid_base, self._T_odom_base)
+        enough = len(self.points_base()) >= self.config.min_points
         return SlamUpdate(
             stamp_s=self._stamp_s,
             T_grid_base=T_grid_base,
@@ -221,6 +227,7 @@ class Tracker(ABC):
             step_covariance=self._step_covariance(T_grid_base),
             quality=self._quality,
             diversity=self._diversity,
+            known=self._known if enough else 0.0,
             matched=matched,
             integrated=integrated,
             jumped=jumped,

@@ -120,12 +120,12 @@ class Window:
         )
 
     def known_share(self, beams: Beams, T_grid_base: Pose) -> float:
-        """Return the share of hits, 0..1, in cells that the window knows anything of; 1 without hits.
+        """Return the share of hits, 0..1, in cells that the window knows anything of; 0 without hits.
 
         It is small on new ground, where there is nothing to match, and large where odometry is wrong.
         """
         if len(beams.hits) == 0:
-            return 1.0
+            return 0.0
         n, origin = self.cells, self.arrays.origin
         cells = np.floor(transform(T_grid_base, beams.hits) / self.resolution_m).astype(np.int64)
         inside = cells[((cells >= origin) & (cells < origin + n)).all(axis=1)] % n

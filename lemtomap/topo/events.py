@@ -54,4 +54,9 @@ class OpeningDone:
     closed: bool
 
 
-NavEvent = EdgeTraversed | EdgeBlocked | Bumped | OpeningSeen | OpeningDone
+@dataclass(frozen=True, slots=True)
+class NothingKnownHere:
+    """A lost robot has seen all it can reach, and none of it looks like the map: this place is new."""
+
+
+NavEvent = EdgeTraversed | EdgeBlocked | Bumped | OpeningSeen | OpeningDone | NothingKnownHere

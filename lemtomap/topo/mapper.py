@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lemtomap.se2 import Pose, adjoint, compose
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
-from lemtomap.topo.events import NavEvent
+from lemtomap.topo.events import NavEvent, NothingKnownHere
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
@@ -355,7 +355,10 @@ class TopoMapper:
 
     def apply(self, event: NavEvent) -> None:
         """Learn what navigation found out. Before the first scan there is nothing to learn it for."""
-        if self._now is not None:
+        if isinstance(event, NothingKnownHere):
+            if self.lost:
+                self.found(known=False)
+        elif self._now is not None:
             learn(event, self.graph, self._associated_id, self.T_node_base)
 
     def view(self, particles: NDArray[np.float64] | None = None) -> MapView:

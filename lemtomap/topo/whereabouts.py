@@ -32,6 +32,7 @@ class WatchConfig:
     fits_again: float = 0.9  # of the usual quality
     misfit: float = 0.6  # of the usual quality: the scan does not belong here, ...
     misfit_s: float = 1.0  # ... when it lasts; people pass by
+    known_share: float = 0.25  # of the hits on known ground at least: new ground and open space tell nothing
     memory: float = 0.05  # share of the newest scan in the usual quality
     carried_s: float = 1.0  # wheels in the air for so long: carried; shorter ones are door sills
 
@@ -65,22 +66,35 @@ class Watch:
 
     def displaced(self, slam: SlamUpdate, odometry: Odometry) -> str:
         """Take one scan; return why somebody must have moved the robot, empty when nobody has."""
-        config, before = self.config, self._before
-        self._before = slam.T_grid_base, odometry.T_odom_base
-        self._fit = slam.quality / self._usual if self._usual > 0.0 else 1.0
+        before, self._before = self._before, (slam.T_grid_base, odometry.T_odom_base)
+        telling = slam.known >= self.config.known_share
+        if telling:
+            self._fit = slam.quality / (self._usual * slam.known) if self._usual > 0.0 else 1.0
+        off = np.zeros(3)
         if before is not None:
-            seen = between(before[0], slam.T_grid_base)
-            off = between(between(before[1], odometry.T_odom_base), seen)
-            way_m, turn_rad = math.hypot(off[0], off[1]), abs(float(off[2]))
-            if way_m > config.jump_m or turn_rad > config.jump_rad:
-                return "the laser sees another place than the wheels can have brought it to"
-            twitched = way_m > config.twitch_m or turn_rad > config.twitch_rad
-            if twitched and self._fit < config.fits_again:
-                return "pushed, and what the laser sees does not fit"
-        if self._fit >= config.misfit:
+            said = between(before[1], odometry.T_odom_base)
+            off = between(said, between(before[0], slam.T_grid_base))
+        return self._leapt(off, telling=telling) or self._misfits(slam, telling=telling)
+
+    def _leapt(self, off: Pose, *, telling: bool) -> str:
+        """Judge how far the laser's way since the last scan is off the wheels'."""
+        config = self.config
+        way_m, turn_rad = math.hypot(off[0], off[1]), abs(float(off[2]))
+        if way_m > config.jump_m or turn_rad > config.jump_rad:
+            return "the laser sees another place than the wheels can have brought it to"
+        twitched = way_m > config.twitch_m or turn_rad > config.twitch_rad
+        if twitched and telling and self._fit < config.fits_again:
+            return "pushed, and what the laser sees does not fit"
+        return ""
+
+    def _misfits(self, slam: SlamUpdate, *, telling: bool) -> str:
+        """Judge how long the scans have not fitted; learn from one that fits how well they usually do."""
+        config = self.config
+        if not telling or self._fit >= config.misfit:
             self._misfit_since_s = None
-            share = config.memory if self._usual > 0.0 else 1.0
-            self._usual += share * (slam.quality - self._usual) if slam.quality > 0.0 else 0.0
+            if telling and slam.quality > 0.0:
+                share = config.memory if self._usual > 0.0 else 1.0
+                self._usual += share * (slam.quality - self._usual)
             return ""
         if self._misfit_since_s is None:
             self._misfit_since_s = slam.stamp_s

@@ -9,7 +9,7 @@ import pytest
 from lemtomap.grid import SlamConfig, WindowMatcher
 from lemtomap.se2 import between, compose
 from lemtomap.topo.config import TopoConfig
-from lemtomap.topo.events import Bumped
+from lemtomap.topo.events import Bumped, NothingKnownHere
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.store import TopoStore
@@ -143,6 +143,22 @@ def test_a_robot_sent_to_a_place_looks_round_finds_itself_and_goes_there(mapped,
     assert told.index("lost: looking for its place in the map") < told.index(f"going to {goal}")
     core.close()
     simulator.close()
+
+
+def test_a_robot_that_knows_nothing_within_reach_maps_on(mapped, tmp_path):
+    _, path, _ = mapped
+    own = tmp_path / "own.lemto"
+    shutil.copy(path, own)
+    robot = SimRobot(worlds.load("home"), seed=3)
+    mapping = Mapping(robot, own, {})
+    mapping.take(robot.stand(0.5))
+    assert mapping.view.lost
+    mapping.exchange.nav_events.put(NothingKnownHere())
+    mapping.take(robot.stand(0.3))
+    assert not mapping.view.lost
+    assert "nothing here looks like the map: mapping on as a new part of it" in mapping.told
+    mapping.step.close()
+    robot.close()
 
 
 def test_a_lifted_robot_remembers_no_cliffs(mapped, tmp_path):

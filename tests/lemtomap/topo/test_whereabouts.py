@@ -10,9 +10,9 @@ from tests.lemtomap.topo.drive import said
 SURE = np.diag([1e-4, 1e-4, 1e-6])
 
 
-def told(watch, stamp_s, T_grid_base, T_odom_base, quality=0.94):
+def told(watch, stamp_s, T_grid_base, T_odom_base, quality=0.94, known=1.0):
     return watch.displaced(
-        said(stamp_s, np.array(T_grid_base, float), quality=quality),
+        said(stamp_s, np.array(T_grid_base, float), quality=quality, known=known),
         Odometry(stamp_s, np.array(T_odom_base, float)),
     )
 
@@ -43,6 +43,15 @@ def test_people_may_stand_in_the_way_for_a_moment_but_not_for_good():
     assert answers[-1] != ""
     watch.restart()
     assert told(watch, 9.0, [50.0, 0.0, 0.0], [0.0, 1.9, np.pi / 2]) == ""
+
+
+@pytest.mark.parametrize(
+    ("quality", "known"), [(0.0, 0.0), (0.3, 0.35)], ids=["nothing in sight", "mostly new ground"]
+)
+def test_open_space_and_new_ground_do_not_tell_that_the_robot_was_moved(quality, known):
+    watch = driven()
+    for k in range(30):
+        assert told(watch, 2.0 + 0.1 * k, [1.9, 0, 0], [0, 1.9, np.pi / 2], quality, known) == ""
 
 
 def test_quality_falls_with_doubt_misfit_and_an_unproven_place():
