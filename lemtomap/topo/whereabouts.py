@@ -66,9 +66,11 @@ class Watch:
 
     def displaced(self, slam: SlamUpdate, odometry: Odometry) -> str:
         """Take one scan; return why somebody must have moved the robot, empty when nobody has."""
-        before, self._before = self._before, (slam.T_grid_base, odometry.T_odom_base)
         telling = slam.known >= self.config.known_share
+        # after a blind stretch the laser makes good the wheels' drift: nothing to compare it with
+        before, self._before = self._before, None
         if telling:
+            self._before = slam.T_grid_base, odometry.T_odom_base
             self._fit = slam.quality / (self._usual * slam.known) if self._usual > 0.0 else 1.0
         off = np.zeros(3)
         if before is not None:

@@ -54,6 +54,12 @@ def test_open_space_and_new_ground_do_not_tell_that_the_robot_was_moved(quality,
         assert told(watch, 2.0 + 0.1 * k, [1.9, 0, 0], [0, 1.9, np.pi / 2], quality, known) == ""
 
 
+def test_the_first_scan_after_a_blind_stretch_may_correct_the_wheels():
+    watch = driven()
+    assert told(watch, 2.0, [5.0, 0, 0], [0, 5.0, np.pi / 2], quality=0.0, known=0.0) == ""
+    assert told(watch, 2.1, [5.0, 0.3, 0], [0, 5.0, np.pi / 2], quality=0.8) == ""
+
+
 def test_quality_falls_with_doubt_misfit_and_an_unproven_place():
     config = WatchConfig()
     best = pose_quality(SURE, 1.0, born=True, measured=True, config=config)
