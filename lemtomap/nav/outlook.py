@@ -51,8 +51,18 @@ class Outlook:
 class FarLook(Protocol):
     """Finds the way as far ahead as it knows the building."""
 
-    def look(self, goal: Goal, route: Route, moment: Moment, tolerance_m: float) -> Outlook:
-        """Return the furthest place of the route that can be reached, and the way to it."""
+    def look(
+        self,
+        goal: Goal,
+        route: Route,
+        moment: Moment,
+        tolerance_m: float,
+        bound_for_grid: tuple[float, float] | None,
+    ) -> Outlook:
+        """Return the furthest place of the route that can be reached, and the way to it.
+
+        bound_for_grid: the place over unseen floor the robot is on its way to, metres; None: to none.
+        """
         ...
 
 
@@ -62,24 +72,38 @@ class WindowLook:
     def __init__(self, surroundings: Surroundings) -> None:
         self._surroundings = surroundings
 
-    def look(self, goal: Goal, route: Route, moment: Moment, tolerance_m: float) -> Outlook:
+    def look(
+        self,
+        goal: Goal,
+        route: Route,
+        moment: Moment,
+        tolerance_m: float,
+        bound_for_grid: tuple[float, float] | None,
+    ) -> Outlook:
         """Look with the body's margin, and without it where that leads further."""
-        reach, target = self._reach(goal, route, moment, tolerance_m, tight=False)
+        reach, target = self._reach(goal, route, moment, tolerance_m, bound_for_grid, tight=False)
         beyond, tight = (0 if target is None else target.index), False
         if target is None or find_barrier(route, moment.map_view.T_grid_node, reach, beyond) is not None:
-            narrow, further = self._reach(goal, route, moment, tolerance_m, tight=True)
+            narrow, further = self._reach(goal, route, moment, tolerance_m, bound_for_grid, tight=True)
             if further is not None and (target is None or further.index > beyond):
                 reach, target, tight = narrow, further, True
         plan = None if target is None else plan_to(reach.costs, moment.T_grid_base, target.cell)
         return Outlook(moment.now_s, reach, target, plan, tight)
 
     def _reach(
-        self, goal: Goal, route: Route, moment: Moment, tolerance_m: float, *, tight: bool
+        self,
+        goal: Goal,
+        route: Route,
+        moment: Moment,
+        tolerance_m: float,
+        bound_for_grid: tuple[float, float] | None,
+        *,
+        tight: bool,
     ) -> tuple[Reach, Target | None]:
         view = moment.map_view
         costs = self._surroundings.costs(view, moment.T_grid_base, moment.now_s, tight=tight)
         reach = reach_from(costs, moment.T_grid_base)
-        return reach, choose_target(route, goal, view.T_grid_node, reach, tolerance_m)
+        return reach, choose_target(route, goal, view.T_grid_node, reach, tolerance_m, bound_for_grid)
 
 
 class Lookout:
@@ -93,6 +117,7 @@ class Lookout:
         """The way to the target as last seen near by."""
         self.picture: CostmapView | None = None
         """The newest costmap of the far look, for viewers."""
+        self._bound_for_grid: tuple[float, float] | None = None
         self._surroundings, self._config = surroundings, config
         self._looked_s = -np.inf
 
@@ -110,11 +135,11 @@ class Lookout:
 
     def forget(self) -> None:
         """The way is another one now."""
-        self.plan = self.outlook = None
+        self.plan = self.outlook = self._bound_for_grid = None
 
     def restart(self) -> None:
-        """There is a new goal: look at once."""
-        self.forget()
+        """There is a new goal: look at once. It may be the old one moved a little: the way stays."""
+        self.plan = self.outlook = None
         self._looked_s = -np.inf
 
     def is_due(self, now_s: float) -> bool:
@@ -131,7 +156,8 @@ class Lookout:
         near = None if self.outlook is None else look_near(self._surroundings, self.outlook, moment)
         found = None
         if self.outlook is None or far or outdated(self.outlook, near, route, moment, self._config):
-            found = self.outlook = self.far.look(goal, route, moment, tolerance_m)
+            found = self.outlook = self.far.look(goal, route, moment, tolerance_m, self._bound_for_grid)
+            self._bound_for_grid = _unproven_place(found)
             self.picture = found.reach.costs.view()
             near = look_near(self._surroundings, found, moment)
         self.plan = self.outlook.plan if near is None else near
@@ -151,6 +177,12 @@ class Lookout:
         """Return the edges of the route behind the target."""
         at = None if self.outlook is None else self.outlook.index_in(route)
         return () if at is None else route.edges[at:]
+
+
+def _unproven_place(outlook: Outlook) -> tuple[float, float] | None:
+    """Return where over unseen floor the outlook leads, metres, grid frame; None over seen floor."""
+    target, plan = outlook.target, outlook.plan
+    return None if target is None or plan is None or target.proven else plan.p_target_grid
 
 
 def look_near(surroundings: Surroundings, outlook: Outlook, moment: Moment) -> MetricPlan | None:

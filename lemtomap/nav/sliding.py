@@ -28,6 +28,8 @@ STEP_M = 0.25
 """Places on an edge are tried this far apart."""
 WORTH_M = 1.0
 """This much seen way along the next edge is better than a node over unseen floor."""
+SAME_NODE_M, SAME_GOAL_M = 0.4, 1.5
+"""How far a node strays in the window between two looks, and how far whoever explores moves a goal."""
 SNAP_M = 0.30
 """A node's pose in the window may be off by this much; its place is looked for this near."""
 
@@ -71,9 +73,19 @@ def place_of(route: Route, index: int, goal: Goal, T_grid_node: Mapping[int, Pos
 
 
 def choose_target(
-    route: Route, goal: Goal, T_grid_node: Mapping[int, Pose], reach: Reach, goal_tolerance_m: float
+    route: Route,
+    goal: Goal,
+    T_grid_node: Mapping[int, Pose],
+    reach: Reach,
+    goal_tolerance_m: float,
+    bound_for_grid: tuple[float, float] | None = None,
 ) -> Target | None:
-    """Return the furthest reachable place of the route, or None if not even the next node can be reached."""
+    """Return the furthest reachable place of the route, or None if not even the next node can be reached.
+
+    bound_for_grid: the place over unseen floor the robot is on its way to. It stays the target while nothing
+    further along the route is seen to be open: how much seen way there is on the edges depends on the node
+    the route starts from, and would send the robot back and forth where the two ways part.
+    """
     last = len(route.nodes) - 1
     unproven: Target | None = None
     for index in range(last, -1, -1):
@@ -83,11 +95,22 @@ def choose_target(
         if not target.proven:
             if index > 0 or last == 0:
                 unproven = target
+                if _is_bound_for(target, bound_for_grid, reach.costs):
+                    return target
             continue
         further = target if target.final else _along_edge(target, route, T_grid_node, reach)
         if index > 0 or unproven is None or further.beyond_m > WORTH_M:
             return further
     return unproven
+
+
+def _is_bound_for(target: Target, p_grid: tuple[float, float] | None, costs: Costs) -> bool:
+    """Tell whether a target over unseen floor is the place the robot is on its way to."""
+    if p_grid is None:
+        return False
+    row, col = costs.cell(p_grid)
+    away_m = math.dist((target.cell[0] + 0.5, target.cell[1] + 0.5), (row, col)) * costs.resolution_m
+    return away_m <= (SAME_GOAL_M if target.final else SAME_NODE_M)
 
 
 def _along_edge(target: Target, route: Route, T_grid_node: Mapping[int, Pose], reach: Reach) -> Target:

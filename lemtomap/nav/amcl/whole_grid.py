@@ -76,7 +76,14 @@ class WholeGridLook:
         self._goal: Goal | None = None
         self._reach: Reach | None = None
 
-    def look(self, goal: Goal, route: Route, moment: Moment, tolerance_m: float) -> Outlook:  # noqa: ARG002 - one node
+    def look(
+        self,
+        goal: Goal,
+        route: Route,  # noqa: ARG002 - one node
+        moment: Moment,
+        tolerance_m: float,
+        bound_for_grid: tuple[float, float] | None,  # noqa: ARG002 - one target
+    ) -> Outlook:
         """Return the way to the goal over the whole grid. Raises NoRoute."""
         barred = self._goal == goal and moment.now_s - self._looked_s < 0.9 * self._config.look_period_s
         self._looked_s, self._goal = moment.now_s, goal

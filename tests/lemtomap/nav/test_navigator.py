@@ -4,7 +4,7 @@ import numpy as np
 
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal, NavState, Reason
-from tests.lemtomap.nav.world import Graph, World, run
+from tests.lemtomap.nav.world import RES, Graph, World, run
 
 
 def two_rooms() -> World:
@@ -93,3 +93,15 @@ def test_refuses_a_point_out_of_reach_soon_after_it_came_to_its_node():
     assert outputs[-1].reason == Reason.BLOCKED
     assert "out of reach" in outputs[-1].text
     assert len(outputs) * 0.1 < 5.2 / 0.5 + 12.0
+
+
+def test_keeps_the_way_over_unseen_floor_where_it_parts_from_the_edges():
+    """At node 1 no other way is left; below the door, at node 2, two metres of seen edge lead back to it."""
+    world = two_rooms()
+    world.graph = Graph.of({1: (2.2, 3.4), 2: (2.2, 1.0)}, [(1, 2)])
+    world.known[round(2.0 / RES) :, round(4.5 / RES) :] = False
+    world.box(4.5, 4.3, 4.65, 5.3)
+    world.pose = np.array([2.2, 3.4, -1.5])
+    outputs = run(world, Navigator(), Goal(1, (4.8, 0.0)), 60.0, lambda w: w.reveal())
+    assert outputs[-1].state == NavState.ARRIVED
+    assert len(outputs) * 0.1 < 1.5 * (9.6 / 0.5), "drove to and fro between two ways"
