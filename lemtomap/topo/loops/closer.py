@@ -11,11 +11,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, adjoint, between, compose
+from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo.loops.audit import Audit
+from lemtomap.topo.loops.candidates import ranked, search_box, spaced, way_m
 from lemtomap.topo.loops.cases import Closure, Confirmed, Situation, Task
 from lemtomap.topo.loops.config import LoopConfig
-from lemtomap.topo.loops.descriptor import describe, distances
 from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis
 from lemtomap.topo.loops.judge import Judge
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
@@ -24,7 +24,6 @@ from lemtomap.topo.loops.places import PlaceBook, chain
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.types import EdgeType
 
-USUAL_UNLIKENESS = 45.0  # descriptor distance of two visits to one place
 TRIALS_KEPT = 4096
 
 
@@ -85,7 +84,7 @@ class LoopCloser:
         self._renew_outlook(situation.here_id)
         self.hypotheses.drop_old(situation.travelled_m)
         chosen = self._candidates(situation, points_grid)
-        if situation.here_id not in situation.measured and self._has_place(situation.here_id):
+        if situation.here_id not in situation.measured and self.places.has(situation.here_id):
             chosen.insert(0, situation.here_id)
         self._call_witness(situation, points_grid)
         if not chosen and not self.hypotheses.alive:
@@ -93,13 +92,13 @@ class LoopCloser:
         reference: Reference | None = None
         followed = self._followed(situation)
         for node_id in dict.fromkeys([*followed, *chosen]):
+            self._note_trial(node_id, situation.travelled_m)
             box = self._box(situation, node_id)
             if box is None:
                 continue
             reference = reference or Reference(situation.grid, points_grid, self.config.match)
-            self._note_trial(node_id, situation.travelled_m)
-            way_m = self._way_m(situation.here_id, node_id)
-            task = Task(node_id, situation, reference, box, way_m)
+            over_edges_m = way_m(self._outlook, situation.here_id, node_id)
+            task = Task(node_id, situation, reference, box, over_edges_m)
             task.follows, task.T_grid_followed = followed.get(node_id, (None, None))
             self._tasks.append(task)
         while len(self._tasks) > 4 * self.config.hearing:
@@ -126,7 +125,7 @@ class LoopCloser:
             return
         best_id, best_m, witnesses = 0, audit.near_m, []
         for node_id, T_here_node in chain(reached).items():
-            if node_id in situation.measured or not self._has_place(node_id):
+            if node_id in situation.measured or not self.places.has(node_id):
                 continue
             at = compose(situation.T_grid_here, T_here_node)
             gap_m = float(np.hypot(*(at[:2] - situation.T_grid_base[:2])))
@@ -157,56 +156,31 @@ class LoopCloser:
 
     def _candidates(self, situation: Situation, points_grid: NDArray[np.float64]) -> list[int]:
         """Return the places worth a search here, most promising first."""
-        outlook, gate = self._outlook, self.config.gate
-        if outlook is None or (robot := self._robot_in(outlook, situation)) is None:
+        config, outlook, now_m = self.config, self._outlook, situation.travelled_m
+        if outlook is None:
             return []
-        near = [
-            node_id
-            for node_id in outlook.near(situation.here_id, robot[0], robot[1], gate.reach_m, gate.least_way_m)
-            if node_id not in situation.measured
-            and self._has_place(node_id)
-            and situation.travelled_m - self._tried.get(node_id, -np.inf) >= self.config.again_after_m
-            and self._way_m(situation.here_id, node_id) >= gate.least_way_m
-        ]
-        if not near:
-            return []
-        base = situation.T_grid_base[:2]
-        around = points_grid[np.abs(points_grid - base).max(axis=1) <= self.config.describe_m]
-        unlike = distances(describe(around), np.array([self.places.descriptor(node_id) for node_id in near]))
-        doubt = np.array([outlook.offness(situation.here_id, node_id, robot) for node_id in near])
-        order = np.argsort((unlike / USUAL_UNLIKENESS) ** 2 + doubt, kind="stable")
-        return self._spaced([near[i] for i in order], self.config.candidates)
-
-    def _has_place(self, node_id: int) -> bool:
-        return self.places.descriptor(node_id) is not None
+        sure, unsure = ranked(outlook, situation, points_grid, self.places, config)
+        sure = [n for n in sure if now_m - self._tried.get(n, -np.inf) >= config.again_after_m]
+        chosen = spaced(outlook, situation.here_id, sure, config.candidates, config.spacing_m, config.gate)
+        if unsure:
+            tried = [n for n, at_m in self._tried.items() if now_m - at_m < config.gate.widest_m]
+            chosen += spaced(
+                outlook,
+                situation.here_id,
+                unsure,
+                config.candidates,
+                config.gate.reach_m,
+                config.gate,
+                tried,
+            )
+        return chosen
 
     def _note_trial(self, node_id: int, travelled_m: float) -> None:
         """Remember when a place was tried, for as long as that keeps it from being tried again."""
         self._tried[node_id] = travelled_m
         if len(self._tried) > TRIALS_KEPT:
-            since_m = travelled_m - self.config.again_after_m
+            since_m = travelled_m - max(self.config.again_after_m, self.config.gate.widest_m)
             self._tried = {tried_id: at_m for tried_id, at_m in self._tried.items() if at_m > since_m}
-
-    def _way_m(self, here_id: int, node_id: int) -> float:
-        """Return the way over edges to a node; a short one means that it lies in the window anyway."""
-        seen = None if self._outlook is None else self._outlook.between(here_id, node_id)
-        return np.inf if seen is None else seen.way_m
-
-    def _spaced(self, node_ids: list[int], count: int) -> list[int]:
-        """Return the first few that are not next to one another."""
-        outlook = self._outlook
-        chosen: list[int] = []
-        places: list[Pose] = []
-        for node_id in node_ids:
-            at = None if outlook is None else outlook.pose(node_id)
-            if at is None:
-                continue
-            if all(np.hypot(at[0] - b[0], at[1] - b[1]) >= self.config.spacing_m for b in places):
-                chosen.append(node_id)
-                places.append(at)
-            if len(chosen) == count:
-                break
-        return chosen
 
     def _followed(self, situation: Situation) -> dict[int, tuple[Hypothesis, Pose]]:
         """Return the known node that should be nearest to the robot by each hypothesis, and where in the
@@ -220,35 +194,16 @@ class LoopCloser:
             for node_id, T_seen_node in self.places.around(seen.node_id, 12.0, 48).items():
                 at = compose(seen.match.T_grid_place, T_seen_node)
                 gap_m = float(np.hypot(at[0] - base[0], at[1] - base[1]))
-                if gap_m < best_m and node_id not in situation.measured and self._has_place(node_id):
+                if gap_m < best_m and node_id not in situation.measured and self.places.has(node_id):
                     best, best_m, T_grid_best = node_id, gap_m, at
             if best and situation.travelled_m - self._tried.get(best, -np.inf) >= 0.5 * self.config.apart_m:
                 chosen.setdefault(best, (hypothesis, T_grid_best))
         return chosen
 
-    def _robot_in(self, outlook: Outlook, situation: Situation) -> Pose | None:
-        T_anchor_here = outlook.pose(situation.here_id)
-        if T_anchor_here is None:
-            return None
-        return compose(T_anchor_here, between(situation.T_grid_here, situation.T_grid_base))
-
     def _box(self, situation: Situation, node_id: int) -> SearchBox | None:
-        """Return where to search a node in the window: the gate, never wider than the window."""
-        outlook, gate = self._outlook, self.config.gate
-        seen = None if outlook is None else outlook.between(situation.here_id, node_id)
-        if seen is None:
-            return None
-        if situation.here_id not in situation.measured:
-            gate = gate.unsure(situation.unsure_m)
-        T_grid_node = compose(situation.T_grid_here, seen.T_from_node)
-        turn = adjoint(np.array([0.0, 0.0, situation.T_grid_here[2]]))
-        sigma = np.sqrt(np.diag(turn @ seen.covariance @ turn.T))
-        half = np.clip(
-            gate.gate_sigmas * sigma,
-            [gate.least_box_m, gate.least_box_m, gate.least_box_rad],
-            [gate.widest_m, gate.widest_m, gate.widest_rad],
-        )
-        return SearchBox(T_grid_node, float(half[0]), float(half[1]), float(half[2]), sigma)
+        """Return where to search a node in the window; None where that is nowhere."""
+        outlook = self._outlook
+        return None if outlook is None else search_box(outlook, situation, node_id, self.config.gate)
 
     # -- searching
     # --------------------------------------------------------------------------------------------
@@ -285,7 +240,7 @@ class LoopCloser:
                     f"sighting {task.situation.here_id}->{task.node_id} n={len(hypothesis.sightings)} {match}"
                 )
             if len(hypothesis.sightings) == 1:
-                hypothesis.needed = self.config.sightings
+                hypothesis.needed = self.config.sightings + int(task.box.is_cut)
                 self._hear(task, hypothesis)
         if task.follows is not None and hypothesis is not task.follows and self._judge.contradicts(task):
             task.follows.rejected += 1
@@ -315,23 +270,22 @@ class LoopCloser:
 
     def _hear(self, task: Task, hypothesis: Hypothesis) -> None:
         """Search every other place within the gate before the belief may become certain."""
-        outlook, gate, situation = self._outlook, self.config.gate, task.situation
-        robot = None if outlook is None else self._robot_in(outlook, situation)
+        config, situation, outlook = self.config, task.situation, self._outlook
         heard = []
-        if outlook is not None and robot is not None:
-            near = outlook.near(situation.here_id, robot[0], robot[1], gate.reach_m, gate.least_way_m)
-            same = self.places.around(task.node_id, self.config.company_m, 48)
-            rest = [
-                node_id
-                for node_id in near
-                if node_id not in same and node_id not in situation.measured and self._has_place(node_id)
-            ]
-            heard = self._spaced(rest, self.config.hearing)
+        if outlook is not None:
+            same = self.places.around(task.node_id, config.company_m, 48)
+            for spacing_m, places in zip(
+                (config.spacing_m, config.gate.reach_m),
+                ranked(outlook, situation, task.reference.points_grid, self.places, config),
+                strict=True,
+            ):
+                others = [node_id for node_id in places if node_id not in same]
+                heard += spaced(outlook, situation.here_id, others, config.hearing, spacing_m, config.gate)
         for node_id in heard:
             box = self._box(situation, node_id)
             if box is not None:
-                way_m = self._way_m(situation.here_id, node_id)
-                self._tasks.append(Task(node_id, situation, task.reference, box, way_m, hypothesis))
+                over_edges_m = way_m(outlook, situation.here_id, node_id)
+                self._tasks.append(Task(node_id, situation, task.reference, box, over_edges_m, hypothesis))
         hypothesis.heard = not heard
 
     def _commit(self, hypothesis: Hypothesis) -> list[Closure]:

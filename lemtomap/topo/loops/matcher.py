@@ -32,13 +32,18 @@ class SearchBox:
     half_y_m: float
     half_yaw_rad: float
     sigma: NDArray[np.float64] | None = None
-    """float64 (3,): m, m, rad, how surely the middle is known, grid frame; None when nothing is."""
+    """float64 (3,): m, m, rad, how surely the place's pose is known, grid frame; None when nothing is."""
+    T_grid_expected: Pose | None = None
+    """Where the place should be; the middle unless told."""
+    is_cut: bool = False
+    """Whether the place may lie outside as well, so that the graph has little say."""
 
     def surprise(self, T_grid_place: Pose) -> float:
-        """Return how many sigmas a pose is away from the middle, on the axis where it is most."""
+        """Return how many sigmas a pose is away from the expected one, on the axis where it is most."""
         if self.sigma is None:
             return 0.0
-        off = np.abs(T_grid_place - self.T_grid_place)
+        expected = self.T_grid_place if self.T_grid_expected is None else self.T_grid_expected
+        off = np.abs(T_grid_place - expected)
         off[2] = abs(wrap_angle(off[2]))
         return float((off / np.maximum(self.sigma, LEAST_SIGMA)).max())
 

@@ -176,27 +176,27 @@ class Outlook:
                 b = self._known[b_id]
         return a
 
-    def near(self, from_id: int, x_m: float, y_m: float, reach_m: float, least_way_m: float) -> list[int]:
+    def near(
+        self, from_id: int, x_m: float, y_m: float, reach_m: float, least_way_m: float
+    ) -> tuple[list[int], NDArray[np.float64], NDArray[np.bool_]]:
         """Return the nodes that may lie within `reach_m` of a point of the anchor's frame, seen from a node.
 
-        Only nodes at least `least_way_m` away over edges; generous, as both ways to the anchor count in full.
+        Likeliest first and not more than `near_nodes`; with how unlikely each is (squared distance in doubts,
+        1 m added), float64 (N,), and whether it is known to within the window, bool (N,). Only nodes at least
+        `least_way_m` away over edges; generous, as both ways to the anchor count in full.
         """
-        start = self._known[from_id]
+        config, start = self._config, self._known[from_id]
         rows = self._rows[: len(self._ids)]
         gap_m = np.hypot(rows[:, 0] - x_m, rows[:, 1] - y_m)
         sums = rows[:, 4:].T + np.array(start.sums)[:, None]
         xx, _, yy = _spread(sums, rows[:, 0], rows[:, 1])
-        doubt_m = np.minimum(self._config.gate_sigmas * np.sqrt(xx + yy), self._config.widest_m)
+        doubt_m = config.gate_sigmas * np.sqrt(xx + yy)
         inside = (gap_m <= reach_m + doubt_m) & (rows[:, 3] + start.way_m >= least_way_m)
-        return [self._ids[i] for i in np.flatnonzero(inside)]
-
-    def offness(self, from_id: int, node_id: int, T_anchor_robot: Pose) -> float:
-        """Return how unlikely it is that the robot is at a node: squared distance in doubts, 1 m added."""
-        node, start = self._known[node_id], self._known[from_id]
-        sums = np.array(node.sums) + np.array(start.sums)
-        xx, _, yy = _spread(sums, node.x_m, node.y_m)
-        gap2 = (node.x_m - T_anchor_robot[0]) ** 2 + (node.y_m - T_anchor_robot[1]) ** 2
-        return float(gap2 / (1.0 + 0.5 * (xx + yy)))
+        offness = gap_m**2 / (1.0 + 0.5 * (xx + yy))
+        chosen = np.flatnonzero(inside)
+        chosen = chosen[np.argsort(offness[chosen], kind="stable")][: config.near_nodes]
+        ids = [self._ids[i] for i in chosen.tolist()]
+        return ids, offness[chosen], doubt_m[chosen] <= config.widest_m
 
 
 def _spread(sums: Sums, x_m: Sums | float, y_m: Sums | float) -> tuple[Sums, Sums, Sums]:

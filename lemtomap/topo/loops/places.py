@@ -55,6 +55,10 @@ class PlaceBook:
         """Return what a node's place looks like, float32 (20,); None when it has no localisation data."""
         return kept(self._descriptors, node_id, DESCRIPTORS_KEPT, self._describe)
 
+    def has(self, node_id: int) -> bool:
+        """Tell whether a node has localisation data to be known again by."""
+        return self.descriptor(node_id) is not None
+
     def alone(self, node_id: int) -> Company | None:
         """Return a node's place without its neighbours; None when it has none."""
         own = self.points(node_id)
