@@ -51,12 +51,12 @@ class GateConfig:
     unsure_box_m: float = 1.2  # ... while the robot's own node is only predicted
     slip_m_per_m: float = 0.1  # ... more by this much of the way since: windows slip along corridors
     unsure_box_rad: float = 0.25
-    widest_m: float = 9.0  # nor wider than the window; where the graph knows less, places are tried in turn
+    widest_m: float = 9.0  # nor wider than the window: what is more doubtful is searched around the robot
     widest_rad: float = 1.0
     least_way_m: float = 12.0  # nearer places over edges lie in the window already
     reach_m: float = 4.0  # a place this near shares enough of the window
     near_nodes: int = 512  # weighed in one update, likeliest first
-    window_m: float = 6.0  # from the robot a place is searched: half as far again as it reaches
+    window_m: float = 6.0  # ... this far from it: half as far again as `reach_m`, for the window's own slips
 
     def unsure(self, way_m: float) -> "GateConfig":
         """Return the gate for a robot whose own node has only been predicted in the window for a way."""

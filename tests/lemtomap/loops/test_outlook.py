@@ -75,7 +75,7 @@ def test_only_nodes_that_may_be_here_are_near():
     outlook = Outlook(graph, 60, GateConfig(shift_var_per_m=1e-4, turn_var_per_m=1e-6))
     outlook.advance(100)
     x, y, _ = outlook.pose(60)
-    near = outlook.near(60, x, y, 3.0, 12.0)
+    near, _, _ = outlook.near(60, x, y, 3.0, 12.0)
     assert 1 in near
     assert 58 not in near  # too near over edges
     assert 20 not in near  # surely elsewhere
