@@ -21,7 +21,7 @@ from lemtomap.nav.motion.dwa import approach
 from lemtomap.nav.outlook import FarLook, Lookout, WindowLook
 from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.sliding import Target, place_of
+from lemtomap.nav.sliding import Target, is_roundabout, place_of
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
     Contact,
@@ -39,7 +39,6 @@ from lemtomap.types import MapView, RouteGraph, Twist
 BUMP_BACK_M = 0.15
 AT_NODE_M = 0.5
 BY_NODE_M = 1.2
-ROUND_SHARE, ROUND_M = 2.0, 3.0
 STAYED_M = 0.4
 REST = Twist(0.0, 0.0)
 
@@ -235,8 +234,7 @@ class Navigator:
         away_m = float(np.hypot(*(place - moment.T_grid_base)[:2]))
         if not target.final:
             return away_m < AT_NODE_M
-        round_m = ROUND_SHARE * float(np.hypot(*goal.p_node)) + ROUND_M
-        return not target.proven and away_m < BY_NODE_M and plan.length_m > round_m
+        return away_m < BY_NODE_M and is_roundabout(route, goal, target, plan.length_m)
 
     # ---- driving ----
 

@@ -15,7 +15,7 @@ from lemtomap.nav.config import NavConfig
 from lemtomap.nav.costmap import Costs
 from lemtomap.nav.metric import MetricPlan, Reach, plan_near, plan_to, reach_from
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.sliding import Target, choose_target, find_barrier
+from lemtomap.nav.sliding import Target, choose_target, find_barrier, is_roundabout
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import CostmapView, Goal
 from lemtomap.nav.way import Moment
@@ -88,6 +88,10 @@ class WindowLook:
             if further is not None and (target is None or further.index > beyond):
                 reach, target, tight = narrow, further, True
         plan = None if target is None else plan_to(reach.costs, moment.T_grid_base, target.cell)
+        if target is not None and plan is not None and is_roundabout(route, goal, target, plan.length_m):
+            places = moment.map_view.T_grid_node
+            target = choose_target(route, goal, places, reach, tolerance_m, goal_seen=True) or target
+            plan = plan_to(reach.costs, moment.T_grid_base, target.cell)
         return Outlook(moment.now_s, reach, target, plan, tight)
 
     def _reach(

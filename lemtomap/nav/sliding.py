@@ -30,6 +30,8 @@ WORTH_M = 1.0
 """This much seen way along the next edge is better than a node over unseen floor."""
 SAME_NODE_M, SAME_GOAL_M = 0.4, 1.5
 """How far a node strays in the window between two looks, and how far whoever explores moves a goal."""
+ROUND_SHARE, ROUND_M = 2.0, 3.0
+"""A goal beside a node is this much of its distance from it away, and a bit, and not further."""
 SNAP_M = 0.30
 """A node's pose in the window may be off by this much; its place is looked for this near."""
 
@@ -79,17 +81,20 @@ def choose_target(
     reach: Reach,
     goal_tolerance_m: float,
     bound_for_grid: tuple[float, float] | None = None,
+    *,
+    goal_seen: bool = False,
 ) -> Target | None:
     """Return the furthest reachable place of the route, or None if not even the next node can be reached.
 
     bound_for_grid: the place over unseen floor the robot is on its way to. It stays the target while nothing
     further along the route is seen to be open: how much seen way there is on the edges depends on the node
     the route starts from, and would send the robot back and forth where the two ways part.
+    goal_seen: a goal beside its node that only unseen floor leads to gives way to the node.
     """
     last = len(route.nodes) - 1
     unproven: Target | None = None
     for index in range(last, -1, -1):
-        target = _target_at(index, route, goal, T_grid_node, reach, goal_tolerance_m)
+        target = _target_at(index, route, goal, T_grid_node, reach, goal_tolerance_m, goal_seen=goal_seen)
         if target is None:
             continue
         if not target.proven:
@@ -102,6 +107,16 @@ def choose_target(
         if index > 0 or unproven is None or further.beyond_m > WORTH_M:
             return further
     return unproven
+
+
+def is_roundabout(route: Route, goal: Goal, target: Target, way_m: float) -> bool:
+    """Tell whether a way over unseen floor to the goal is far too long: it leads through gaps in walls.
+
+    way_m: the way to the target. A robot on either way finds the same the further it gets along it.
+    """
+    if not target.final or target.proven:
+        return False
+    return way_m > route.length_m + ROUND_SHARE * math.hypot(*goal.p_node) + ROUND_M
 
 
 def _is_bound_for(target: Target, p_grid: tuple[float, float] | None, costs: Costs) -> bool:
@@ -195,6 +210,8 @@ def _target_at(
     T_grid_node: Mapping[int, Pose],
     reach: Reach,
     goal_tolerance_m: float,
+    *,
+    goal_seen: bool,
 ) -> Target | None:
     place = place_of(route, index, goal, T_grid_node)
     if place is None:
@@ -204,7 +221,8 @@ def _target_at(
     if reach.costs.holds(place, 0.0 if final else BORDER_M):
         found = reach.nearest(place, max(SNAP_M, goal_tolerance_m))
     T_grid_node_here = T_grid_node[route.nodes[index]]
-    if found is None and final and goal.p_node != (0.0, 0.0) and reach.costs.holds(T_grid_node_here):
+    shut = found is None or (goal_seen and found[2] == 2)
+    if shut and final and goal.p_node != (0.0, 0.0) and reach.costs.holds(T_grid_node_here):
         final = False  # go to its node and look from there
         found = reach.nearest(T_grid_node_here, SNAP_M)
     if found is None:

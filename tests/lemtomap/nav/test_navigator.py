@@ -105,3 +105,23 @@ def test_keeps_the_way_over_unseen_floor_where_it_parts_from_the_edges():
     outputs = run(world, Navigator(), Goal(1, (4.8, 0.0)), 60.0, lambda w: w.reveal())
     assert outputs[-1].state == NavState.ARRIVED
     assert len(outputs) * 0.1 < 1.5 * (9.6 / 0.5), "drove to and fro between two ways"
+
+
+def test_refuses_at_its_node_a_point_that_only_a_long_way_over_unseen_floor_might_lead_to():
+    world = two_rooms()
+    world.graph = Graph.of({1: (2.2, 3.4), 2: (2.2, 2.16), 3: (2.2, 1.0)}, [(1, 2), (2, 3)])
+    world.known[round(2.15 / RES) :, round(4.65 / RES) :] = False
+    world.known[round(1.9 / RES) :, round(8.0 / RES) :] = False
+    world.box(4.5, 2.0, 9.0, 2.15)
+    world.box(4.5, 2.0, 4.65, 6.0)
+    world.pose = np.array([2.2, 2.15, 1.5])
+    ys = []
+
+    def look(w):
+        w.reveal()
+        ys.append(w.pose[1])
+
+    outputs = run(world, Navigator(), Goal(1, (2.75, 0.0)), 60.0, look)
+    assert outputs[-1].state == NavState.FAILED
+    assert "out of reach" in outputs[-1].text
+    assert min(ys) > 2.0, "set out on the long way first"
