@@ -240,8 +240,6 @@ class Docking:
             self.state = DockingState.DOCKED
         return self._output(0.0, 0.0)
 
-    # ---- helpers ----
-
     def _on_dock(self, sample: KobukiSample) -> bool:
         """Tell whether the charger's byte, not the debounced battery, names the dock now."""
         if sample.on_dock:
