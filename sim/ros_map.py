@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
+from scipy import ndimage
 
 from sim.errors import BadWorld
 from sim.raster import SPAWN_CLEARANCE_M, boxes_from_raster, clearance_m, connected, find_spawn
@@ -16,6 +17,7 @@ from sim.ros_truth import read_truth
 from sim.world import Pose2, Raster, World
 
 WALL_HEIGHT_M = 1.0
+SOLID_M2 = 0.25  # unmapped ground of that size is what nobody could look into; less is a speck of the mapping
 GAP_M = 2.5  # between copies and round them
 MAX_SIDE_PX = 20_000  # 1 km at 0.05 m
 KNOWN_SPAWNS: dict[str, Pose2] = {
@@ -43,6 +45,7 @@ def load_ros_map(path: Path) -> World:
     free = probability <= free_below
     if not free.any():
         raise BadWorld(f"{image_path}: no free space (no pixel lighter than free_thresh {free_below})")
+    occupied |= _edge_of_unmapped(occupied, free, resolution)
     raster = Raster(occupied, free, resolution, (x0, y0))
     spawn = _spawn(raster, path)
     raster = Raster(occupied, connected(raster, spawn[:2]), resolution, (x0, y0))
@@ -54,6 +57,20 @@ def load_ros_map(path: Path) -> World:
         truth=read_truth(path.parent, raster),
         description=f"ROS map {path.name}",
     )
+
+
+def _edge_of_unmapped(
+    occupied: NDArray[np.bool_], free: NDArray[np.bool_], resolution_m: float
+) -> NDArray[np.bool_]:
+    """Return the unmapped cells that border on floor, bool (rows, cols): walls, as nothing is known behind.
+
+    Without them a robot leaves a real plan through glass and gaps, into a plain without end.
+    """
+    unmapped = ~occupied & ~free
+    labels, _ = ndimage.label(unmapped)
+    large = np.bincount(labels.ravel()) * resolution_m**2 >= SOLID_M2
+    large[0] = False
+    return large[labels] & ndimage.binary_dilation(free)
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:

@@ -88,6 +88,19 @@ def test_copies_of_a_map_stand_in_a_row(tmp_path):
     assert len(three.boxes) == 3 * len(one.boxes) + 4
 
 
+def test_unmapped_ground_is_walled_off_where_a_plan_has_a_gap(tmp_path):
+    grey = np.full((60, 80), 205, dtype=np.uint8)
+    grey[11:50, 11:69] = 254
+    grey[10, 10:70] = grey[50, 10:70] = grey[10:51, 10] = grey[10:51, 69] = 0
+    grey[10, 30:50] = 205  # a metre of glass that the mapping laser saw through
+    grey[30, 40] = 205  # a speck
+    (tmp_path / "m.pgm").write_bytes(b"P5\n80 60\n255\n" + grey.tobytes())
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n")
+    raster = worlds.load(tmp_path / "m.yaml").raster
+    assert raster.occupied[49, 30:50].all()
+    assert not raster.occupied[29, 40]
+
+
 def test_toml_world_is_built_and_furniture_moves_by_day(tmp_path):
     path = tmp_path / "home.toml"
     path.write_text(HOME)
