@@ -71,6 +71,9 @@ class _LookFile:
             yield Look(scan, hits.astype(np.float32) * np.float32(HIT_STEP_M))
         self._file.seek(0, 2)
 
+    def close(self) -> None:
+        self._file.close()
+
 
 class ScanTrail:
     """Append-only file of (stamp, node, T_node_base), one record for each scan. Not part of the map."""
@@ -134,6 +137,7 @@ class ScanTrail:
         if not self._file.closed:
             self._flush()
             self._file.close()
+            self._looks.close()
 
     def _flush(self) -> None:
         self._file.seek(0, 2)

@@ -59,7 +59,7 @@ def test_unread_port_drops_whole_frames_and_keeps_little_backlog():
     frame = b"\xaa\x55" + bytes(77) + b"\x01\x02"
     for _ in range(200):
         port.write(frame)
-        time.sleep(0.001)  # the kernel counts unread bytes a moment later
+        time.sleep(0.005)  # the kernel counts unread bytes a moment later
     backlog = b""
     while select.select([client], [], [], 0.05)[0]:
         backlog += os.read(client, 65536)
