@@ -55,7 +55,7 @@ class Watch:
     def restart(self) -> None:
         """Begin anew, in a new window."""
         self._usual = 0.0
-        self._fit = 1.0
+        self._fit = self._fit_known = 1.0  # of all hits, and of those on known ground alone
         self._misfit_since_s: float | None = None
         self._before: tuple[Pose, Pose] | None = None
 
@@ -69,9 +69,10 @@ class Watch:
         telling = slam.known >= self.config.known_share
         # after a blind stretch the laser makes good the wheels' drift: nothing to compare it with
         before, self._before = self._before, None
+        self._fit = slam.quality / self._usual if self._usual > 0.0 else 1.0
         if telling:
             self._before = slam.T_grid_base, odometry.T_odom_base
-            self._fit = slam.quality / (self._usual * slam.known) if self._usual > 0.0 else 1.0
+            self._fit_known = self._fit / slam.known
         off = np.zeros(3)
         if before is not None:
             said = between(before[1], odometry.T_odom_base)
@@ -85,18 +86,18 @@ class Watch:
         if way_m > config.jump_m or turn_rad > config.jump_rad:
             return "the laser sees another place than the wheels can have brought it to"
         twitched = way_m > config.twitch_m or turn_rad > config.twitch_rad
-        if twitched and telling and self._fit < config.fits_again:
+        if twitched and telling and self._fit_known < config.fits_again:
             return "pushed, and what the laser sees does not fit"
         return ""
 
     def _misfits(self, slam: SlamUpdate, *, telling: bool) -> str:
         """Judge how long the scans have not fitted; learn from one that fits how well they usually do."""
         config = self.config
-        if not telling or self._fit >= config.misfit:
+        if not telling or self._fit_known >= config.misfit:
             self._misfit_since_s = None
             if telling and slam.quality > 0.0:
                 share = config.memory if self._usual > 0.0 else 1.0
-                self._usual += share * (slam.quality - self._usual)
+                self._usual += share * (slam.quality / slam.known - self._usual)
             return ""
         if self._misfit_since_s is None:
             self._misfit_since_s = slam.stamp_s

@@ -52,6 +52,7 @@ def test_open_space_and_new_ground_do_not_tell_that_the_robot_was_moved(quality,
     watch = driven()
     for k in range(30):
         assert told(watch, 2.0 + 0.1 * k, [1.9, 0, 0], [0, 1.9, np.pi / 2], quality, known) == ""
+    assert watch.fit < 0.5  # nor do they make a pose sure
 
 
 def test_the_first_scan_after_a_blind_stretch_may_correct_the_wheels():
