@@ -26,21 +26,6 @@ class MonotonicClock:
         return (time.monotonic_ns() - self._start_ns) * 1e-9
 
 
-class ManualClock:
-    """A virtual one, moved by whoever steps the world."""
-
-    def __init__(self) -> None:
-        self._now_ns = 0
-
-    def now_s(self) -> float:
-        """Return the virtual time."""
-        return self._now_ns * 1e-9
-
-    def set_ns(self, now_ns: int) -> None:
-        """Move to a time, never back."""
-        self._now_ns = max(now_ns, self._now_ns)
-
-
 def stamp_ns(now_s: float) -> int:
     """Return the whole nanoseconds that gave `now_s`. Holds: stamp_ns(n * 1e-9) == n below 20 days."""
     return round(now_s * 1e9)

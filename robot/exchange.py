@@ -7,9 +7,6 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
 from drivers.kobuki.docking import DockingOutput
 from lemtomap.nav.types import Contact, NavOutput, Sighting
 from lemtomap.topo.events import NavEvent
@@ -129,8 +126,3 @@ class Exchange:
         """Return what each queue has lost because its reader was too slow."""
         queues = (self.scans, self.sightings, self.contacts, self.nav_events, self.notes)
         return {queue.name: queue.dropped for queue in queues}
-
-
-def points_of(scan: TimedScan | None) -> NDArray[np.float64]:
-    """Return the hits of a scan, float64 (N, 2), metres, base frame at its stamp."""
-    return scan.sighting.hits_base if scan is not None else np.zeros((0, 2))

@@ -173,13 +173,14 @@ class Tracker(ABC):
         leapt = turn_rad > config.large_turn_rad
         match = self._match(beams, predicted, uncertainty, window, config.search_rad if leapt else 0.0)
         poor = match.quality < config.good_share * self._usual_quality
-        self._known = self._window().known_share(beams, predicted) if poor else 1.0
+        self._known = window.known_share(beams, predicted) if poor else 1.0
         # after a leap, what ground lies under the hits is chance; else new ground speaks against no pose
-        chance = leapt or math.hypot(self._pending[0], self._pending[1]) > config.search_m
+        way_m = math.hypot(self._pending[0], self._pending[1])
+        chance = leapt or way_m > config.search_m
         wanted = self._usual_quality * (1.0 if chance else self._known)
         if match.quality < config.collapse_share * wanted:
             match = self._look_round(beams, match, predicted, leapt=leapt)
-        elif match.accepted and math.hypot(self._pending[0], self._pending[1]) > config.match_distance_m:
+        elif match.accepted and way_m > config.match_distance_m:
             change = match.T_grid_base - predicted
             self._trust.learn(change, float(predicted[2]), match.information, expected)
         share = config.quality_memory if self._usual_quality else 1.0
