@@ -10,7 +10,10 @@ import typer
 
 from robot.cli_help import add
 
-MISSIONS = "explore, tour, goto:PLACE (a node's number, its name, far, start), dock, several joined by commas"
+MISSIONS = (
+    "explore, tour, goto:PLACE (a node's number, its name, far, start), level:N (on that floor now), dock, "
+    "several joined by commas"
+)
 
 Mission = Annotated[str, typer.Option(metavar="WHAT", help=MISSIONS)]
 Kobuki = Annotated[str | None, typer.Option(metavar="PORT", help="the base; default: found by USB identity")]
@@ -199,9 +202,11 @@ def teleop(
     out: Out = None,
     config: Config = None,
 ) -> None:
-    """Drive the real robot by the keyboard: arrows or w a s d, space stops, q ends; it maps on the way."""
+    """Drive the real robot by the keyboard, mapping on the way; a digit says on which floor it is now."""
     from robot.robot_run import RobotOptions
+    from robot.teleop import HELP
 
+    typer.echo(HELP)
     _drive("teleop", RobotOptions("idle", math.inf, kobuki, hokuyo, map_file, out, config, by_hand=True))
 
 

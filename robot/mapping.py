@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.topo.events import LevelChanged
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.whereabouts import Watch
 from lemtomap.types import GridView, MapView, Odometry, Scan, SlamUpdate
@@ -55,7 +56,10 @@ class MappingStep:
             if carried:
                 self._lose(stamp_s, "carried elsewhere, or put back: wheels hung in the air")
         for event in self._exchange.nav_events.drain():
-            self.mapper.apply(event)
+            if isinstance(event, LevelChanged):
+                self._change_level(stamp_s, event.level)
+            else:
+                self.mapper.apply(event)
         update = self.slam.update(timed.scan, timed.odometry)
         moved = self._watch.displaced(update, timed.odometry)
         if moved:  # this scan may show both places: the new window begins with the next
@@ -78,9 +82,20 @@ class MappingStep:
     def _lose(self, stamp_s: float, why: str) -> None:
         """Begin with an empty window, in a part of the map of its own."""
         self._exchange.note(stamp_s, "mapping", why, Level.WARN)
+        self._begin_window()
+        self.mapper.lose()
+
+    def _change_level(self, stamp_s: float, level: int) -> None:
+        """Begin with an empty window on another level, in the same part of the map."""
+        if level == self.mapper.level:
+            return
+        self._exchange.note(stamp_s, "mapping", f"on level {level} now")
+        self._begin_window()
+        self.mapper.change_level(level)
+
+    def _begin_window(self) -> None:
         self.slam = self._make_slam()
         self._watch.restart()
-        self.mapper.lose()
 
     def _publish(self, view: MapView) -> None:
         if view.associated_id != self._associated_id:

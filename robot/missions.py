@@ -12,7 +12,7 @@ from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal, NavOutput, NavState
 from lemtomap.se2 import Pose
-from lemtomap.topo.events import NavEvent
+from lemtomap.topo.events import LevelChanged, NavEvent
 from lemtomap.types import MapView, RouteGraph
 from robot.exchange import MissionState
 from robot.ways import farthest_node, ways_from
@@ -96,6 +96,18 @@ class GoTo:
             why = moment.output.text or str(moment.output.reason)
             return Order(MissionState.FAILED, f"{self.place} not reached: {why}")
         return Order(MissionState.RUNNING, f"going to {self.place}")
+
+
+class ChangeLevel:
+    """Say that the robot is on another level now: it was carried by a lift, or stands at a ramp's end."""
+
+    def __init__(self, level: int) -> None:
+        self._level = level
+
+    def step(self, moment: Moment) -> Order:  # noqa: ARG002 -- a person knows
+        """Tell the map."""
+        text = f"on level {self._level}"
+        return Order(MissionState.DONE, text, cancel=True, events=(LevelChanged(self._level),))
 
 
 class Dock:
@@ -220,7 +232,10 @@ def resolve(place: str, moment: Moment) -> int | None:
 
 
 def parse_mission(text: str) -> Mission:
-    """Return the mission meant by `explore`, `tour`, `goto:PLACE`, `dock`, or several joined by commas."""
+    """Return the mission meant by one word, or several joined by commas. Raises BadSetting.
+
+    `explore`, `tour`, `goto:PLACE`, `level:N` or `dock`.
+    """
     missions = [_parse_one(part.strip()) for part in text.split(",")]
     return missions[0] if len(missions) == 1 else Series(missions)
 
@@ -229,6 +244,8 @@ def _parse_one(text: str) -> Mission:
     kind, _, place = text.partition(":")
     if kind == "goto" and place:
         return GoTo(place)
+    if kind == "level" and re.fullmatch(r"-?\d+", place):
+        return ChangeLevel(int(place))
     if text == "explore":
         return Explore()
     if text == "tour":
@@ -238,5 +255,5 @@ def _parse_one(text: str) -> Mission:
     if text == "idle":
         return Idle()
     raise BadSetting(
-        f"mission '{text}': must be explore, tour, goto:PLACE, dock, or several joined by commas"
+        f"mission '{text}': must be explore, tour, goto:PLACE, level:N, dock, or several joined by commas"
     )

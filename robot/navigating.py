@@ -6,6 +6,7 @@ from typing import Protocol
 
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal
+from lemtomap.topo.events import LevelChanged
 from lemtomap.types import MapView, RouteGraph, Twist
 from robot.exchange import Exchange, Level, MissionState, MissionStatus
 from robot.finding import Finder
@@ -85,6 +86,8 @@ class NavigationStep:
         elif order.cancel:
             self.navigator.cancel()
         for event in order.events:
+            if isinstance(event, LevelChanged):
+                self.navigator.surroundings.forget_window()
             self._exchange.nav_events.put(event)
         if order.dock is not bool(self._exchange.dock.get()):
             self._exchange.dock.put(order.dock)

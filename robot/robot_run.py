@@ -13,6 +13,7 @@ from serial.tools import list_ports
 from drivers.port import BytePort, open_serial
 from lemtomap.errors import BadSetting
 from lemtomap.grid import DEFAULT_SLAM
+from lemtomap.topo.events import LevelChanged
 from lemtomap.topo.reader import TopoReader
 from robot import ports
 from robot.config import PortsConfig, RobotConfig, load
@@ -21,7 +22,7 @@ from robot.missions import parse_mission
 from robot.progress import Bar, first_use
 from robot.run import Run, RunPlan, Teller
 from robot.runtime import Ports, Runtime
-from robot.teleop import driven_by_hand
+from robot.teleop import Listener, driven_by_hand
 from robot.warmup import warm_up
 
 
@@ -75,7 +76,12 @@ def _hands(options: RobotOptions, runtime: Runtime) -> AbstractContextManager[No
     """Return what lets a person drive, or nothing."""
     if not options.by_hand:
         return nullcontext()
-    return driven_by_hand(runtime.core.base.teleop, runtime.clock.now_s, runtime.stop.set)
+    core = runtime.core
+
+    def change_level(level: int) -> None:
+        core.exchange.nav_events.put(LevelChanged(level))
+
+    return driven_by_hand(Listener(core.base.teleop, change_level, runtime.stop.set), runtime.clock.now_s)
 
 
 def find_ports(config: PortsConfig, options: RobotOptions) -> PortsConfig:

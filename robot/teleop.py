@@ -1,5 +1,7 @@
 """Driving by hand from the keyboard, through the same velocity chain and safety gate as everything else."""
 
+import os
+import re
 import select
 import sys
 import termios
@@ -7,6 +9,7 @@ import threading
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from lemtomap.errors import BadSetting
 from lemtomap.types import Twist
@@ -14,7 +17,10 @@ from lemtomap.types import Twist
 FORWARD_MPS, TURN_RADPS = 0.3, 0.9  # a walking pace that a person can follow
 HOLD_S = 0.6  # a held key repeats after up to half a second; then the robot stops by itself
 REPEAT_S = 0.1
-HELP = "arrow keys or w a s d drive, space stops, q ends"
+HELP = "arrow keys or w a s d drive, space stops, a digit: on that floor now, q ends"
+
+KEY = re.compile(r"\x1b\[.|.", re.DOTALL)
+DIGITS = "0123456789"
 
 REST = Twist()
 WISHES = {
@@ -47,42 +53,54 @@ class Keys:
         return self._wish if now_s - self._pressed_s < HOLD_S else REST
 
 
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Who hears what the person at the keyboard wants."""
+
+    offer: Callable[[Twist, float], None]
+    """Takes a wished velocity and the time, s."""
+    change_level: Callable[[int], None]
+    """Takes the level on which the robot is now."""
+    end: Callable[[], None]
+
+
 @contextmanager
-def driven_by_hand(
-    offer: Callable[[Twist, float], None], now_s: Callable[[], float], end: Callable[[], None]
-) -> Iterator[None]:
-    """Read the terminal while the body runs and offer the wishes. Raises BadSetting without a terminal."""
+def driven_by_hand(listener: Listener, now_s: Callable[[], float]) -> Iterator[None]:
+    """Pass on what the terminal says while the body runs. Raises BadSetting without a terminal."""
     if not sys.stdin.isatty():
         raise BadSetting("teleop: needs a terminal to read keys from")
-    before = termios.tcgetattr(sys.stdin)
+    terminal = sys.stdin.fileno()
+    before = termios.tcgetattr(terminal)
     stop = threading.Event()
 
     def read() -> None:
         keys = Keys()
         while not stop.is_set():
-            key = _next_key(REPEAT_S)
-            if key == "q":
-                end()
-                return
-            keys.press(key, now_s())
-            offer(keys.wish(now_s()), now_s())
+            for key in _keys_pressed(terminal, REPEAT_S):
+                if key == "q":
+                    listener.end()
+                    return
+                if key in DIGITS:
+                    listener.change_level(int(key))
+                keys.press(key, now_s())
+            listener.offer(keys.wish(now_s()), now_s())
 
     reader = threading.Thread(target=read, name="keys", daemon=True)
-    tty.setcbreak(sys.stdin)
+    tty.setcbreak(terminal)
     reader.start()
     try:
         yield
     finally:
         stop.set()
         reader.join(1.0)
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+        termios.tcsetattr(terminal, termios.TCSADRAIN, before)
 
 
-def _next_key(timeout_s: float) -> str:
-    """Return a key, an arrow's three characters as one; empty when none was pressed in time."""
-    if not select.select([sys.stdin], [], [], timeout_s)[0]:
-        return ""
-    key = sys.stdin.read(1)
-    if key == "\x1b" and select.select([sys.stdin], [], [], 0.02)[0]:
-        key += sys.stdin.read(2)
-    return key
+def _keys_pressed(terminal: int, timeout_s: float) -> list[str]:
+    """Return the keys pressed, an arrow's three characters as one; empty when none was in time.
+
+    Read past Python's buffer, which would keep from `select` what it holds.
+    """
+    if not select.select([terminal], [], [], timeout_s)[0]:
+        return []
+    return KEY.findall(os.read(terminal, 256).decode(errors="replace"))

@@ -59,4 +59,11 @@ class NothingKnownHere:
     """A lost robot has seen all it can reach, and none of it looks like the map: this place is new."""
 
 
-NavEvent = EdgeTraversed | EdgeBlocked | Bumped | OpeningSeen | OpeningDone | NothingKnownHere
+@dataclass(frozen=True, slots=True)
+class LevelChanged:
+    """The robot is on another level now: it came out of a lift, or to the end of a ramp."""
+
+    level: int
+
+
+NavEvent = EdgeTraversed | EdgeBlocked | Bumped | OpeningSeen | OpeningDone | NothingKnownHere | LevelChanged

@@ -13,6 +13,7 @@ from lemtomap.topo.events import NavEvent, NothingKnownHere
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
+from lemtomap.topo.levels import Lift, put_on_level
 from lemtomap.topo.local import EdgePicture, LocalMap, Standing
 from lemtomap.topo.neighbours import NeighbourFinder, in_sight
 from lemtomap.topo.paging import PagedGraph
@@ -80,6 +81,7 @@ class TopoMapper:
         self._transform = Transform(measured=True, covariance=np.zeros((3, 3)))
         self._tried_m = 0.0
         self._now: _Now | None = None
+        self._lift: Lift | None = None
         self._picture = EdgePicture(self.graph, self.local)
 
     @property
@@ -133,6 +135,9 @@ class TopoMapper:
 
     def _begin(self) -> None:
         """Stand on a first node; in a map that knows places already, look for one of them."""
+        if self._lift is not None:
+            self._leave_lift(self._lift)
+            return
         known = self._recogniser is not None and any(True for _ in self.store.places())
         self.part_id = self._birth()
         self.local.settle(self.part_id)
@@ -313,15 +318,30 @@ class TopoMapper:
         own = [n for n, standing in self.local.standings.items() if standing.born and standing.anchored]
         return min(own, key=self._distance_m, default=0)
 
-    def change_level(self, level: int) -> int:
-        """Say that the robot is on another level now (a lift, the end of a ramp); returns its first node.
+    def change_level(self, level: int) -> None:
+        """Say that the robot is on another level now (a lift, the end of a ramp).
 
-        The odometry edge to it is the lift or ramp; near-neighbour edges join one level only.
+        What the window shows belongs to the level it left: the next scan, from a window of its own, begins
+        with a node that an odometry edge, the lift or ramp, joins to the last one. Near-neighbour edges and
+        closures join one level only.
         """
+        if level != self.level and self._now is not None:
+            self._lift = Lift.left(self._associated_id, self.T_node_base, self._drift, self._now.slam)
+            self.lose()
+        self.level = level
+
+    def _leave_lift(self, lift: Lift) -> None:
+        node_id, self._lift = self._birth(), None
+        self.graph.add_edge(lift.edge_to(node_id, self._require().slam, COVARIANCE_FLOOR))
+        self.local.settle(node_id)
+        if self._recogniser is not None:
+            self._recogniser.window_changed(self)
+
+    def adopt_level(self, level: int) -> None:
+        """Put what was mapped since the robot was lost on the level on which it proves to be."""
         if level != self.level:
+            put_on_level(self.graph, self.part_id, level)
             self.level = level
-            self._create()
-        return self._associated_id
 
     def lose(self) -> None:
         """Say that the robot is somewhere else now (carried, pushed away).

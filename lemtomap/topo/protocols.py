@@ -49,6 +49,10 @@ class Recogniser(Protocol):
         """The robot does not know where in the map it is: nodes from `mapper.part_id` on are a part apart."""
         ...
 
+    def window_changed(self, mapper: "TopoMapper") -> None:
+        """The window began anew, on another level: nothing found in the old one counts any more."""
+        ...
+
     def update(self, mapper: "TopoMapper") -> None:
         """Work a slice after each scan; may call close_loop, revoke, relocate or found."""
         ...

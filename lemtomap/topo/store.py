@@ -219,9 +219,10 @@ class TopoStore:
             return node_from(row)
         return None
 
-    def nodes(self) -> Iterator[Node]:
-        """Iterate over all nodes by ID; streams, so also over maps larger than memory."""
-        return (node_from(row) for row in self.query(f"SELECT {NODE_COLUMNS} FROM node ORDER BY id"))  # noqa: S608
+    def nodes(self, since_id: int = 0) -> Iterator[Node]:
+        """Iterate over all nodes from one on, by ID; streams, so also over maps larger than memory."""
+        wanted = f"SELECT {NODE_COLUMNS} FROM node WHERE id >= ? ORDER BY id"  # noqa: S608
+        return (node_from(row) for row in self.query(wanted, (since_id,)))
 
     def put_node(self, node: Node) -> None:
         """Write a changed node."""
@@ -365,11 +366,6 @@ class TopoStore:
         """Remember something felt at a node (`mark.mark_id` is ignored)."""
         values = (mark.node_id, mark.kind, mark.x_m, mark.y_m, mark.stamp_s)
         self._write("INSERT INTO mark(node, kind, x, y, stamp) VALUES(?, ?, ?, ?, ?)", values)
-
-    def marks_of(self, node_id: int) -> list[Mark]:
-        """Return what was felt at a node."""
-        rows = self.query("SELECT id, node, kind, x, y, stamp FROM mark WHERE node = ?", (node_id,))
-        return [Mark(*row) for row in rows]
 
     def meta(self, key: str) -> Any:
         """Return a stored value, None when there is none."""

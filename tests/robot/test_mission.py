@@ -6,6 +6,7 @@ import pytest
 
 from lemtomap.errors import BadSetting
 from lemtomap.nav.types import NavOutput, NavState
+from lemtomap.topo.events import LevelChanged
 from lemtomap.types import RouteEdge, Twist
 from robot.exchange import MissionState
 from robot.missions import GoTo, Moment, parse_mission
@@ -106,3 +107,14 @@ def test_what_is_no_mission_is_refused_by_name(text):
 def test_the_farthest_node_is_farthest_by_way_not_by_number():
     assert farthest_node(Line(), 8) == 1
     assert farthest_node(Line(), 2) == 9
+
+
+def test_a_lift_is_told_to_the_map_between_two_missions():
+    mission = parse_mission("level:2,goto:5")
+    order = mission.step(moment(NavState.IDLE, 1))
+    assert list(order.events) == [LevelChanged(2)]
+    assert order.state is MissionState.RUNNING
+    assert mission.step(moment(NavState.IDLE, 2)).goal.node_id == 5
+    for wrong in ("level:", "level:up", "level"):
+        with pytest.raises(BadSetting, match="level:N"):
+            parse_mission(wrong)

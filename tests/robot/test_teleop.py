@@ -1,10 +1,14 @@
 """A held key drives; a key let go of, or a lost terminal, soon means: stand."""
 
+import os
+import pty
+import threading
+
 import pytest
 
 from lemtomap.errors import BadSetting
 from lemtomap.types import Twist
-from robot.teleop import HOLD_S, REST, Keys, driven_by_hand
+from robot.teleop import HOLD_S, REST, Keys, Listener, driven_by_hand
 
 
 def test_a_key_drives_as_long_as_it_repeats_and_then_the_robot_stands():
@@ -30,6 +34,36 @@ def test_nobody_drives_without_a_terminal(monkeypatch):
     monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
     with (
         pytest.raises(BadSetting, match="terminal"),
-        driven_by_hand(lambda *_: None, lambda: 0.0, lambda: None),
+        driven_by_hand(Listener(lambda *_: None, lambda _: None, lambda: None), lambda: 0.0),
     ):
         pass
+
+
+def test_a_digit_tells_the_level_and_q_ends(monkeypatch):
+    ours, theirs = pty.openpty()
+    heard, wishes, ended = [], [], threading.Event()
+    with os.fdopen(theirs, "r") as terminal:
+        monkeypatch.setattr("sys.stdin", terminal)
+        listener = Listener(lambda wish, _: wishes.append(wish), heard.append, ended.set)
+        with driven_by_hand(listener, lambda: 0.0):
+            os.write(ours, b"w2q")
+            assert ended.wait(10.0)
+    os.close(ours)
+    assert heard == [2]
+    assert set(wishes) <= {REST}  # nothing is driven any more once the end was asked for
+
+
+def test_arrows_drive_even_when_their_characters_come_at_once(monkeypatch):
+    ours, theirs = pty.openpty()
+    driven = threading.Event()
+    with os.fdopen(theirs, "r") as terminal:
+        monkeypatch.setattr("sys.stdin", terminal)
+
+        def offer(wish, _):
+            if wish.v_mps > 0.0:
+                driven.set()
+
+        with driven_by_hand(Listener(offer, lambda _: None, lambda: None), lambda: 0.0):
+            os.write(ours, b"\x1b[A")
+            assert driven.wait(10.0)
+    os.close(ours)

@@ -159,7 +159,7 @@ class LoopCloser:
         config, outlook, now_m = self.config, self._outlook, situation.travelled_m
         if outlook is None:
             return []
-        sure, unsure = ranked(outlook, situation, points_grid, self.places, config)
+        sure, unsure = self._ranked(outlook, situation, points_grid)
         sure = [n for n in sure if now_m - self._tried.get(n, -np.inf) >= config.again_after_m]
         chosen = spaced(outlook, situation.here_id, sure, config.candidates, config.spacing_m, config.gate)
         if unsure:
@@ -174,6 +174,14 @@ class LoopCloser:
                 tried,
             )
         return chosen
+
+    def _ranked(
+        self, outlook: Outlook, situation: Situation, points_grid: NDArray[np.float64]
+    ) -> list[list[int]]:
+        """Return the known places on this level that may lie here: sure ones, and unsure ones."""
+        level = self.graph.node(situation.here_id).level
+        found = ranked(outlook, situation, points_grid, self.places, self.config)
+        return [[n for n in node_ids if self.graph.node(n).level == level] for node_ids in found]
 
     def _note_trial(self, node_id: int, travelled_m: float) -> None:
         """Remember when a place was tried, for as long as that keeps it from being tried again."""
@@ -276,7 +284,7 @@ class LoopCloser:
             same = self.places.around(task.node_id, config.company_m, 48)
             for spacing_m, places in zip(
                 (config.spacing_m, config.gate.reach_m),
-                ranked(outlook, situation, task.reference.points_grid, self.places, config),
+                self._ranked(outlook, situation, task.reference.points_grid),
                 strict=True,
             ):
                 others = [node_id for node_id in places if node_id not in same]

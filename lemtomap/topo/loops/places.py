@@ -87,10 +87,11 @@ class PlaceBook:
         own = self.points(node_id)
         if own is None or len(own) == 0:
             return None
-        parts = [own]
+        parts, level = [own], self._graph.node(node_id).level
         for other_id, T_node_other in self.around(node_id, self._company_m, 32).items():
             points = self.points(other_id)
-            if other_id != node_id and points is not None and len(points):
+            alike = other_id != node_id and self._graph.node(other_id).level == level
+            if alike and points is not None and len(points):
                 parts.append(transform(T_node_other, points))
         joined = np.concatenate(parts)
         joined = joined[np.hypot(joined[:, 0], joined[:, 1]) <= self._company_m]

@@ -57,6 +57,15 @@ class LoopRecogniser:
         self._lost_m = mapper.travelled_m
         self.locator = self._locator(mapper, lambda node_id: node_id < part_id)
 
+    def window_changed(self, mapper: "TopoMapper") -> None:
+        """Drop what was found in a window that is no more, and look anew."""
+        if mapper.lost:
+            self.lost(mapper)
+            return
+        self._of(mapper).restart()
+        self._found.clear()
+        self.locator = None
+
     def _locator(self, mapper: "TopoMapper", is_known: Callable[[int], bool]) -> Locator:
         return Locator(self.config, mapper.graph, self._index_of(mapper), is_known)
 
@@ -138,6 +147,8 @@ class LoopRecogniser:
         self._of(mapper).audit.commit([edge], support=evidence)
         at = mapper.now[0].T_grid_base
         gap_m = float(np.hypot(located.T_grid_node[0] - at[0], located.T_grid_node[1] - at[1]))
+        if mapper.lost:
+            mapper.adopt_level(mapper.graph.node(located.node_id).level)
         if mapper.lost and gap_m <= mapper.config.new_node_distance_m:
             mapper.relocate(located.node_id, located.T_grid_node, located.covariance)
         self._anchor(mapper, Confirmed(located.node_id, located.T_grid_node, located.covariance))

@@ -136,7 +136,10 @@ def test_navigation_teaches_times_blocks_bumps_and_openings(loop):
     loop.apply(EdgeBlocked(1, 40, 77.0))  # no such edge: nothing to learn
     here = loop.associated_id
     loop.apply(Bumped("bump", 0.2, 0.0, 9.0))
-    (mark,) = store.marks_of(here)
+    store.commit()
+    with TopoReader(store.path) as reader:
+        (mark,) = reader.marks()
+    assert mark.node_id == here
     at = compose(loop.T_node_base, [0.2, 0.0, 0.0])
     assert (mark.x_m, mark.y_m) == pytest.approx((at[0], at[1]))
     loop.apply(OpeningSeen(1, here, 2.0, 0.0, 0.1, 0.9))

@@ -109,20 +109,6 @@ def test_a_reader_sees_a_blocked_edge_and_its_undoing(store):
             assert reader.edges_of(2)[0].blocked_until_s == until_s
 
 
-def test_on_another_level_a_lift_edge_is_made_and_no_near_neighbours_across(tmp_path):
-    mapper = TopoMapper(TopoConfig(), TopoStore.create(tmp_path / "map.lemto"))
-    stamp = lead(mapper, [(-2, 0), (2, 0)], room())
-    below = mapper.associated_id
-    above = mapper.change_level(1)
-    assert above != below
-    lead(mapper, [(2, 0), (2, 2), (-2, 2), (-2, -1), (1, -1)], room(), start_s=stamp)
-    levels = {node.node_id: node.level for node in mapper.store.nodes()}
-    assert set(levels.values()) == {0, 1}
-    across = [e for e in mapper.store.edges() if levels[e.source_id] != levels[e.target_id]]
-    assert [(e.source_id, e.target_id, e.type) for e in across] == [(below, above, EdgeType.ODOMETRY)]
-    mapper.close()
-
-
 def test_the_layout_agrees_with_all_edges_and_the_trajectory_with_the_drive(tmp_path):
     mapper = TopoMapper(TopoConfig(), TopoStore.create(tmp_path / "map.lemto"))
     lead(mapper, [(-2, -2), (2, -2), (2, 2), (-2, 2), (-2, -1.0)], room())
