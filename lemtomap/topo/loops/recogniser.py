@@ -131,27 +131,24 @@ class LoopRecogniser:
         doubt = reversed_covariance(here.T_grid_node, here.covariance)
         covariance = chain_covariance(doubt, located.T_grid_node, located.covariance)
         edge = mapper.close_loop(here_id, located.node_id, T_here_node, covariance)
-        T_grid_node, match = located.T_grid_node, located.match
+        match, found = located.match, Confirmed(located.node_id, located.T_grid_node, located.covariance)
         evidence = float(self.config.locator.checks)
         closure = Closure(
             here_id,
             located.node_id,
             T_here_node,
             covariance,
-            T_grid_node,
+            located.T_grid_node,
             match,
             informs=True,
             evidence=evidence,
         )
         self.closures.append((edge.edge_id, closure))
         self._of(mapper).audit.commit([edge], support=evidence)
-        at = mapper.now[0].T_grid_base
-        gap_m = float(np.hypot(located.T_grid_node[0] - at[0], located.T_grid_node[1] - at[1]))
         if mapper.lost:
             mapper.adopt_level(mapper.graph.node(located.node_id).level)
-        if mapper.lost and gap_m <= mapper.config.new_node_distance_m:
-            mapper.relocate(located.node_id, located.T_grid_node, located.covariance)
-        self._anchor(mapper, Confirmed(located.node_id, located.T_grid_node, located.covariance))
+            self._stand_at(mapper, found)
+        self._anchor(mapper, found)
         self._of(mapper).restart()
         self.locator = None
         mapper.found()
@@ -172,15 +169,24 @@ class LoopRecogniser:
                 self.closures.append((edge.edge_id, closure))
         if edges:
             closer.audit.commit(edges, support=sum(closure.evidence for closure in closures))
-        for closure in closures:
-            self._anchor(mapper, Confirmed(closure.node_id, closure.T_grid_node, closure.match.covariance))
-        if closures and not self._stands(mapper, mapper.associated_id):
-            latest = closures[-1]
-            mapper.relocate(latest.node_id, latest.T_grid_node, latest.match.covariance)
-            self._anchor(mapper, Confirmed(latest.node_id, latest.T_grid_node, latest.match.covariance))
+        found = [Confirmed(each.node_id, each.T_grid_node, each.match.covariance) for each in closures]
+        for each in found:
+            self._anchor(mapper, each)
+        if found and not self._stands(mapper, mapper.associated_id):
+            nearest = min(found, key=lambda each: _gap_m(mapper, each))
+            self._stand_at(mapper, nearest)
+            self._anchor(mapper, nearest)
         for confirmed in closer.confirmed:
             self._anchor(mapper, confirmed)
         closer.confirmed.clear()
+
+    def _stand_at(self, mapper: "TopoMapper", found: Confirmed) -> None:
+        """Make a node that was found the associated one if the robot is at it.
+
+        From further off an odometry edge would begin there that nobody has driven.
+        """
+        if _gap_m(mapper, found) <= mapper.config.new_node_distance_m:
+            mapper.relocate(found.node_id, found.T_grid_node, found.covariance)
 
     def _revoke(self, mapper: "TopoMapper", closer: LoopCloser, edge_ids: list[int]) -> None:
         """Take back closures that proved wrong, and what was believed because of them."""
@@ -215,3 +221,9 @@ class LoopRecogniser:
         if self._index is None:
             self._index = PlaceIndex.of_map(mapper.store)
         return self._index
+
+
+def _gap_m(mapper: "TopoMapper", found: Confirmed) -> float:
+    """Return how far the robot is from a node that was found."""
+    at = mapper.now[0].T_grid_base
+    return float(np.hypot(found.T_grid_node[0] - at[0], found.T_grid_node[1] - at[1]))
