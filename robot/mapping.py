@@ -57,7 +57,7 @@ class MappingStep:
         for event in self._exchange.nav_events.drain():
             self.mapper.apply(event)
         update = self.slam.update(timed.scan, timed.odometry)
-        moved = self._watch.displaced(update, timed.odometry)
+        moved = self._watch.displaced(update, timed.odometry, timed.sighting.hits_base)
         if moved:  # this scan may show both places: the new window begins with the next
             self._lose(stamp_s, moved)
             return
@@ -71,6 +71,10 @@ class MappingStep:
         if self._lifted_since_s is not None:
             return
         self._lifted_since_s = stamp_s
+        self._disown()
+
+    def _disown(self) -> None:
+        """Say that the pose published last is worth nothing any more; there is no other yet."""
         view = self._exchange.map_view.get()
         if view is not None:
             self._exchange.map_view.put(replace(view, quality=0.0))
@@ -78,6 +82,7 @@ class MappingStep:
     def _lose(self, stamp_s: float, why: str) -> None:
         """Begin with an empty window, in a part of the map of its own."""
         self._exchange.note(stamp_s, "mapping", why, Level.WARN)
+        self._disown()
         self.slam = self._make_slam()
         self._watch.restart()
         self.mapper.lose()
