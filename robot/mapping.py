@@ -61,7 +61,7 @@ class MappingStep:
             else:
                 self.mapper.apply(event)
         update = self.slam.update(timed.scan, timed.odometry)
-        moved = self._watch.displaced(update, timed.odometry)
+        moved = self._watch.displaced(update, timed.odometry, timed.sighting.hits_base)
         if moved:  # this scan may show both places: the new window begins with the next
             self._lose(stamp_s, moved)
             return
@@ -75,6 +75,10 @@ class MappingStep:
         if self._lifted_since_s is not None:
             return
         self._lifted_since_s = stamp_s
+        self._disown()
+
+    def _disown(self) -> None:
+        """Say that the pose published last is worth nothing any more; there is no other yet."""
         view = self._exchange.map_view.get()
         if view is not None:
             self._exchange.map_view.put(replace(view, quality=0.0))
@@ -82,6 +86,7 @@ class MappingStep:
     def _lose(self, stamp_s: float, why: str) -> None:
         """Begin with an empty window, in a part of the map of its own."""
         self._exchange.note(stamp_s, "mapping", why, Level.WARN)
+        self._disown()
         self._begin_window()
         self.mapper.lose()
 

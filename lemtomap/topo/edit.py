@@ -64,7 +64,7 @@ def delete_node(store: TopoStore, node_id: int, stamp_s: float = 0.0) -> None:
         recording.touch("place", node_id)
         for end in ("source", "target"):
             recording.touch_where("edge", end, node_id)
-        for table in ("name", "placeholder", "mark"):
+        for table in ("name", "placeholder", "ground", "mark"):
             recording.touch_where(table, "node", node_id)
         store.delete_node(node_id)
 

@@ -55,6 +55,15 @@ class OpeningDone:
 
 
 @dataclass(frozen=True, slots=True)
+class GroundSeen:
+    """What has been seen around a node, for exploration to ask for when the robot comes back."""
+
+    node_id: int
+    picture: bytes
+    """As navigation codes it; the map only keeps it."""
+
+
+@dataclass(frozen=True, slots=True)
 class NothingKnownHere:
     """A lost robot has seen all it can reach, and none of it looks like the map: this place is new."""
 
@@ -66,4 +75,13 @@ class LevelChanged:
     level: int
 
 
-NavEvent = EdgeTraversed | EdgeBlocked | Bumped | OpeningSeen | OpeningDone | NothingKnownHere | LevelChanged
+NavEvent = (
+    EdgeTraversed
+    | EdgeBlocked
+    | Bumped
+    | OpeningSeen
+    | OpeningDone
+    | GroundSeen
+    | NothingKnownHere
+    | LevelChanged
+)

@@ -19,6 +19,7 @@ KEYS = {
     "name": "name",
     "area": "id",
     "placeholder": "id",
+    "ground": "node",
     "mark": "id",
 }
 KEPT_EDITS = 1000

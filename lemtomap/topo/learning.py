@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from lemtomap.se2 import Pose, transform
-from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed, NavEvent, OpeningDone, OpeningSeen
+from lemtomap.topo.events import (
+    Bumped,
+    EdgeBlocked,
+    EdgeTraversed,
+    GroundSeen,
+    NavEvent,
+    OpeningDone,
+    OpeningSeen,
+)
 from lemtomap.topo.graph import Mark, OpeningState, Placeholder
 from lemtomap.topo.paging import PagedGraph
 
@@ -26,11 +34,17 @@ def learn(event: NavEvent, graph: PagedGraph, associated_id: int, T_node_base: P
             graph.store.add_mark(Mark(0, associated_id, kind, float(x), float(y), stamp_s))
         case OpeningSeen(number, node_id, x_m, y_m, yaw_rad, width_m):
             graph.store.put_placeholder(Placeholder(number, node_id, x_m, y_m, yaw_rad, width_m))
+        case GroundSeen(node_id, picture):
+            if graph.store.node(node_id) is not None:
+                graph.store.put_ground(node_id, picture)
         case OpeningDone(number, closed):
-            for opening in graph.store.placeholders():
-                if opening.placeholder_id == number:
-                    state = OpeningState.CLOSED if closed else OpeningState.EXPLORED
-                    graph.store.put_placeholder(replace(opening, state=state))
+            _end_opening(graph, number, OpeningState.CLOSED if closed else OpeningState.EXPLORED)
+
+
+def _end_opening(graph: PagedGraph, number: int, state: OpeningState) -> None:
+    for opening in graph.store.placeholders():
+        if opening.placeholder_id == number:
+            graph.store.put_placeholder(replace(opening, state=state))
 
 
 def _learn_time(graph: PagedGraph, from_id: int, to_id: int, time_s: float) -> None:

@@ -121,6 +121,12 @@ class TopoReader:
             rows = self._db.execute("SELECT id, node, x, y, yaw, width, state FROM placeholder ORDER BY id")
             return [placeholder_from(row) for row in rows]
 
+    def ground_seen(self, node_id: int) -> bytes | None:
+        """Return what exploration told of the ground around a node, None when it told nothing."""
+        with schema.guarded(self.path):
+            row = self._db.execute("SELECT picture FROM ground WHERE node = ?", (node_id,)).fetchone()
+        return None if row is None else bytes(row[0])
+
     def marks(self) -> list[Mark]:
         """Return everything that was felt rather than seen."""
         with schema.guarded(self.path):

@@ -31,6 +31,7 @@ TABLES = {
     "name": "(name TEXT PRIMARY KEY, node INT) WITHOUT ROWID",
     "area": "(id INTEGER PRIMARY KEY, name TEXT, kind TEXT, tags TEXT)",
     "placeholder": "(id INTEGER PRIMARY KEY, node INT, x REAL, y REAL, yaw REAL, width REAL, state TEXT)",
+    "ground": "(node INTEGER PRIMARY KEY, picture BLOB)",
     "mark": "(id INTEGER PRIMARY KEY, node INT, kind TEXT, x REAL, y REAL, stamp REAL)",
     "change": "(version INTEGER PRIMARY KEY, node INT)",
     "journal": "(id INTEGER PRIMARY KEY, stamp REAL, what TEXT, before TEXT)",

@@ -235,7 +235,7 @@ class TopoStore:
         """Remove a node with its edges, names and marks. Its ID stays used for ever."""
         for edge in self.edges_of(node_id):
             self.delete_edge(edge.edge_id)
-        for table in ("name", "place", "placeholder", "mark"):
+        for table in ("name", "place", "placeholder", "ground", "mark"):
             self._write(f"DELETE FROM {table} WHERE node = ?", (node_id,))  # noqa: S608
         self._write("DELETE FROM node WHERE id = ?", (node_id,))
         self.set_meta("next_node", self._next_node)
@@ -361,6 +361,10 @@ class TopoStore:
         """Return all openings."""
         rows = self.query("SELECT id, node, x, y, yaw, width, state FROM placeholder ORDER BY id")
         return [placeholder_from(row) for row in rows]
+
+    def put_ground(self, node_id: int, picture: bytes) -> None:
+        """Write what has been seen around a node over what was there before."""
+        self._write("REPLACE INTO ground(node, picture) VALUES(?, ?)", (node_id, picture))
 
     def add_mark(self, mark: Mark) -> None:
         """Remember something felt at a node (`mark.mark_id` is ignored)."""

@@ -1,20 +1,24 @@
 """How well the robot knows where it is: the pose quality, and the signs that it was carried or pushed away.
 
 Only the robot's own evidence counts: what the wheels and the gyro say against what the laser says, how well
-a scan fits its window against how well scans usually fit, and the covariance of the pose.
+a scan fits its window against how well scans usually fit, whether it shows what the scan before it showed,
+and the covariance of the pose.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from lemtomap.se2 import Pose, between
+from lemtomap.se2 import Pose, between, transform
 from lemtomap.topo.graph import Covariance
 from lemtomap.types import Odometry, SlamUpdate
 
 RIGHT_M, RIGHT_RAD = 0.10, math.radians(2.0)
 """A pose is right within these: what a quality promises."""
+COMPARED = 3  # every so many hits of a scan are looked for in another
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +37,11 @@ class WatchConfig:
     misfit: float = 0.6  # of the usual quality: the scan does not belong here, ...
     misfit_s: float = 1.0  # ... when it lasts; people pass by
     known_share: float = 0.25  # of the hits on known ground at least: new ground and open space tell nothing
+    again_m: float = 0.1  # a hit this near to one of an earlier scan shows the same thing
+    again: float = 0.35  # share of such hits below which nothing is left of it (robots left alone: 0.98)
+    again_points: int = 60  # six metres of wall: fewer hits tell nothing
+    before_s: float = 0.35  # age of the scan before, at most ...
+    matched_s: float = 1.5  # ... and of the last one matched: since then the wheels err by centimetres
     memory: float = 0.05  # share of the newest scan in the usual quality
     carried_s: float = 1.0  # wheels in the air for so long: carried; shorter ones are door sills
 
@@ -43,6 +52,30 @@ class WatchConfig:
     doubted: float = 0.6  # quality of a pose that the window does not bear out, at most
     good_fit: float = 0.85  # of the usual quality: nothing to doubt
     bad_fit: float = 0.55  # no quality left
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """One scan and where odometry had the robot."""
+
+    stamp_s: float
+    odometry: Odometry
+    hits_base: NDArray[np.floating]
+
+    def alike(self, before: "_Seen", within_s: float, config: WatchConfig) -> float:
+        """Return the share of hits with one of an earlier scan near by, or the other way round if that is
+        more; 1 where there is too little, or too old, to compare with.
+        """
+        few = min(len(self.hits_base), len(before.hits_base)) < config.again_points
+        if few or self.stamp_s - before.stamp_s > within_s:
+            return 1.0
+        T_here_before = between(self.odometry.T_odom_base, before.odometry.T_odom_base)
+        earlier = transform(T_here_before, before.hits_base)
+        shares = [
+            np.isfinite(cKDTree(there).query(here[::COMPARED], distance_upper_bound=config.again_m)[0]).mean()
+            for here, there in ((earlier, self.hits_base), (self.hits_base, earlier))
+        ]
+        return float(max(shares))
 
 
 class Watch:
@@ -58,14 +91,21 @@ class Watch:
         self._fit = self._fit_known = 1.0  # of all hits, and of those on known ground alone
         self._misfit_since_s: float | None = None
         self._before: tuple[Pose, Pose] | None = None
+        self._last: _Seen | None = None
+        self._matched: _Seen | None = None
 
     @property
     def fit(self) -> float:
         """How well the latest scan fits its window, as a share of what is usual."""
         return self._fit
 
-    def displaced(self, slam: SlamUpdate, odometry: Odometry) -> str:
-        """Take one scan; return why somebody must have moved the robot, empty when nobody has."""
+    def displaced(
+        self, slam: SlamUpdate, odometry: Odometry, hits_base: NDArray[np.floating] | None = None
+    ) -> str:
+        """Take one scan; return why somebody must have moved the robot, empty when nobody has.
+
+        hits_base: the scan's hits, float (N, 2), metres, base frame at its stamp.
+        """
         telling = slam.known >= self.config.known_share
         # after a blind stretch the laser makes good the wheels' drift: nothing to compare it with
         before, self._before = self._before, None
@@ -77,7 +117,28 @@ class Watch:
         if before is not None:
             said = between(before[1], odometry.T_odom_base)
             off = between(said, between(before[0], slam.T_grid_base))
+        vanished = hits_base is not None and self._vanished(slam, _Seen(slam.stamp_s, odometry, hits_base))
+        if vanished:
+            return "nothing of what was in sight a moment ago is there any more"
         return self._leapt(off, telling=telling) or self._misfits(slam, telling=telling)
+
+    def _vanished(self, slam: SlamUpdate, seen: _Seen) -> bool:
+        """Tell whether nothing is left of what the scan before showed.
+
+        On ground that the window does not know a scan fits nothing, whether the robot drove there or was put
+        there; but who drives still sees a moment later what was in sight before. A scan that was not matched,
+        for the robot stands, fits its window as well as it shows what the last one that was matched did.
+        """
+        config, last, self._last = self.config, self._last, seen
+        if slam.matched:
+            self._matched = seen
+        elif self._matched is not None and self._fit >= config.good_fit:
+            self._fit = min(self._fit, seen.alike(self._matched, config.matched_s, config))
+        return (
+            self._fit < config.good_fit
+            and last is not None
+            and (seen.alike(last, config.before_s, config) < config.again)
+        )
 
     def _leapt(self, off: Pose, *, telling: bool) -> str:
         """Judge how far the laser's way since the last scan is off the wheels'."""

@@ -107,6 +107,31 @@ def test_a_carried_robot_says_so_and_finds_itself_again(mapped):
     robot.close()
 
 
+def test_a_robot_pushed_onto_ground_its_window_does_not_know_notices_with_the_first_scan(mapped, tmp_path):
+    world, path, born = mapped
+    own = tmp_path / "own.lemto"
+    shutil.copy(path, own)
+    robot = SimRobot(world, seed=2)
+    robot.put(np.array([2.9, 2.2, 0.0]))
+    mapping = Mapping(robot, own, dict(born))
+    mapping.take(robot.stand(1.0))
+    mapping.exchange.nav_events.put(NothingKnownHere())  # it maps on: no look-up helps it now
+    mapping.take(robot.stand(1.0))
+    assert mapping.view.quality > 0.9
+    elsewhere = np.array([13.5, 5.0, 0.0])
+    robot.put(elsewhere)
+    qualities = []
+    for seen in robot.stand(0.5):
+        mapping.take([seen])
+        if np.hypot(*(seen.T_world_base - elsewhere)[:2]) < 0.1:  # not of a scan taken before
+            qualities.append(mapping.view.quality)
+    assert max(qualities) == 0.0
+    assert mapping.view.lost
+    assert "nothing of what was in sight a moment ago is there any more" in mapping.told
+    mapping.step.close()
+    robot.close()
+
+
 def test_a_part_that_nothing_joins_is_joined_when_the_robot_comes_by(mapped, tmp_path):
     world, path, born = mapped
     own = tmp_path / "own.lemto"

@@ -106,7 +106,7 @@ class Explorer:
             self._openings.recall(graph.openings())
         self._recalled = True
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
-        reach = self._look(map_view, T_grid_base, now_s)
+        reach = self._look(map_view, graph, T_grid_base, now_s)
         self._judge(navigation, now_s)
         fresh = FreshGraph(graph, map_view, self._nav.route.usual_speed_mps)
         goal = self._choose(Here(map_view, fresh, reach, T_grid_base, now_s))
@@ -114,18 +114,19 @@ class Explorer:
         self._empty_looks = 0 if opened else self._empty_looks + 1
         done = self._empty_looks >= self.config.sure_looks
         text = self._text(now_s, done=done)
-        self._output = ExploreOutput(goal, done, text, *self._lists(), self._openings.take_events())
+        events = (*self._openings.take_events(), *self._memory.take_events(last=done))
+        self._output = ExploreOutput(goal, done, text, *self._lists(), events)
         return self._output
 
-    def _look(self, map_view: MapView, T_grid_base: Pose, now_s: float) -> Reach:
+    def _look(self, map_view: MapView, graph: RouteGraph, T_grid_base: Pose, now_s: float) -> Reach:
         """Find the openings of the window, leave out forgotten ones, and join them with the known."""
         config = self.config
         self._costmap.follow_window(map_view.grid)
         costs = self._costmap.build(map_view.stamp_s, np.empty((0, 2)), T_grid_base[:2])
         costs = costs.over_seen_floor(T_grid_base[:2])
         reach = reach_from(costs, T_grid_base)
-        self._memory.take(costs, map_view.T_grid_node, T_grid_base)
-        seen = self._memory.recall(costs, map_view.T_grid_node)
+        self._memory.take(costs, map_view.T_grid_node, T_grid_base, graph)
+        seen = self._memory.recall(costs, map_view.T_grid_node, graph)
         ground = Ground.of(reach, seen, config.least_depth_m)
         openings = find_openings(ground, config.rest_size_m)
         self._openings.match(openings, ground, map_view.T_grid_node, map_view.associated_id, now_s)

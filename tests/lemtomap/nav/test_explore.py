@@ -1,11 +1,16 @@
 """Exploration in the small kinematic world, through a window that learns and forgets."""
 
+from dataclasses import dataclass, field
+
 import numpy as np
 import pytest
 
+from lemtomap.nav.config import NavConfig
+from lemtomap.nav.costmap import Costmap
 from lemtomap.nav.explore.explorer import Explorer
+from lemtomap.nav.explore.memory import SeenMemory
 from lemtomap.nav.navigator import Navigator
-from lemtomap.topo.events import OpeningDone, OpeningSeen
+from lemtomap.topo.events import GroundSeen, OpeningDone, OpeningSeen
 from lemtomap.topo.graph import OpeningState, Placeholder
 from tests.lemtomap.nav.world import RES, Graph, World
 
@@ -26,6 +31,19 @@ def office() -> World:
     return world
 
 
+@dataclass
+class Keeping(Graph):
+    """A graph on file that is told what was seen from its nodes."""
+
+    pictures: dict[int, bytes] = field(default_factory=dict)
+
+    def keep(self, events):
+        self.pictures.update({each.node_id: each.picture for each in events if isinstance(each, GroundSeen)})
+
+    def ground_seen(self, node_id):
+        return self.pictures.get(node_id)
+
+
 def explore(world: World, seconds: float, window_m: float):
     navigator, explorer = Navigator(), Explorer()
     output, events, seen = None, [], np.zeros_like(world.known)
@@ -37,6 +55,8 @@ def explore(world: World, seconds: float, window_m: float):
         view = world.view()
         wish = explorer.step(view, world.graph, output, world.T_odom_base, world.now_s)
         events.extend(wish.events)
+        if isinstance(world.graph, Keeping):
+            world.graph.keep(wish.events)
         if wish.done:
             break
         if wish.goal is not None:
@@ -84,3 +104,37 @@ def test_goes_on_where_an_earlier_drive_left_off():
     assert 7 in numbers
     assert 9 not in numbers
     assert min(numbers - {7}, default=10) >= 10
+
+
+def test_a_later_drive_does_not_explore_again_what_an_earlier_one_has_seen():
+    world = office()
+    world.graph = Keeping(world.graph.places, world.graph.links)
+    explore(world, 400.0, 6.0)
+    way_m = []
+    for graph in (world.graph, Graph(world.graph.places, world.graph.links)):
+        later = office()
+        later.graph, begun_s = graph, later.now_s
+        wish, _, _ = explore(later, 60.0, 6.0)
+        way_m.append(later.now_s - begun_s)
+        assert wish.done == (graph is world.graph), wish.text
+    assert way_m[0] < 20.0
+
+
+def test_pictures_of_the_ground_far_from_the_robot_are_with_the_map():
+    world = office()
+    world.known[:] = True
+    costmap = Costmap(NavConfig().costmap, NavConfig().body)
+    costmap.follow_window(world.view().grid)
+    costs = costmap.build(world.now_s, np.empty((0, 2)), world.pose[:2])
+    memory, graph = SeenMemory(kept=5), Keeping({}, [])
+    places = {k: np.array([1.0 + 0.1 * k, 4.0, 0.1 * k]) for k in range(100)}
+    for k, place in places.items():
+        memory.take(costs, {k: place}, place, graph)
+        graph.keep(memory.take_events())
+        assert len(memory) <= 5
+    assert len(graph.pictures) == 99  # all but that of the node it is at
+    world.known[:] = False
+    costmap.follow_window(world.view().grid)
+    unknown = costmap.build(world.now_s, np.empty((0, 2)), world.pose[:2])
+    bare = SeenMemory().recall(unknown, {0: places[0]}).sum()
+    assert memory.recall(unknown, {0: places[0]}, graph).sum() > bare + 1000

@@ -4,7 +4,7 @@ import pytest
 from lemtomap.se2 import between, compose, pose
 from lemtomap.topo.align import Match
 from lemtomap.topo.config import TopoConfig
-from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed, OpeningDone, OpeningSeen
+from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed, GroundSeen, OpeningDone, OpeningSeen
 from lemtomap.topo.graph import OpeningState, Place
 from lemtomap.topo.local import LocalMap
 from lemtomap.topo.mapper import TopoMapper
@@ -142,6 +142,10 @@ def test_navigation_teaches_times_blocks_bumps_and_openings(loop):
     assert mark.node_id == here
     at = compose(loop.T_node_base, [0.2, 0.0, 0.0])
     assert (mark.x_m, mark.y_m) == pytest.approx((at[0], at[1]))
+    loop.apply(GroundSeen(here, b"old"))
+    loop.apply(GroundSeen(here, b"picture"))
+    loop.apply(GroundSeen(4000, b"picture"))  # no such node
+    assert list(store.query("SELECT node, picture FROM ground")) == [(here, b"picture")]
     loop.apply(OpeningSeen(1, here, 2.0, 0.0, 0.1, 0.9))
     loop.apply(OpeningDone(1, closed=True))
     assert [(o.node_id, o.state) for o in store.placeholders()] == [(here, OpeningState.CLOSED)]

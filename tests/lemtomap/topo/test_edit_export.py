@@ -31,11 +31,12 @@ def store(tmp_path):
     with TopoStore.open(tmp_path / "office.lemto") as store:
         store.set_name("kitchen", 3)
         store.put_place(3, Place(1.0, b"boundary", b"\x00\xff"))
+        store.put_ground(3, b"picture")
         yield store
 
 
 def everything(store):
-    tables = ("node", "place", "edge", "name", "area", "placeholder", "mark")
+    tables = ("node", "place", "edge", "name", "area", "placeholder", "ground", "mark")
     return {t: sorted(map(repr, store.query(f"SELECT * FROM {t}"))) for t in tables}  # noqa: S608
 
 

@@ -3,17 +3,21 @@
 import numpy as np
 import pytest
 
+from lemtomap.se2 import transform
 from lemtomap.topo.whereabouts import Watch, WatchConfig, pose_quality
 from lemtomap.types import Odometry
 from tests.lemtomap.topo.drive import said
 
+ANGLES = np.linspace(-2.0, 2.0, 200)
+ROOM = 3.0 * np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=-1)
 SURE = np.diag([1e-4, 1e-4, 1e-6])
 
 
-def told(watch, stamp_s, T_grid_base, T_odom_base, quality=0.94, known=1.0):
+def told(watch, stamp_s, T_grid_base, T_odom_base, quality=0.94, known=1.0, hits=None):
     return watch.displaced(
         said(stamp_s, np.array(T_grid_base, float), quality=quality, known=known),
         Odometry(stamp_s, np.array(T_odom_base, float)),
+        hits,
     )
 
 
@@ -53,6 +57,24 @@ def test_open_space_and_new_ground_do_not_tell_that_the_robot_was_moved(quality,
     for k in range(30):
         assert told(watch, 2.0 + 0.1 * k, [1.9, 0, 0], [0, 1.9, np.pi / 2], quality, known) == ""
     assert watch.fit < 0.5  # nor do they make a pose sure
+
+
+def test_who_sees_nothing_of_what_was_in_sight_before_was_moved_even_onto_unknown_ground():
+    at, odom = [1.9, 0, 0], [0, 1.9, np.pi / 2]
+    watch = driven()
+    assert told(watch, 2.0, at, odom, hits=ROOM) == ""
+    assert told(watch, 2.1, at, odom, quality=0.06, known=0.06, hits=ROOM * 0.7) != ""
+    watch = driven()
+    assert told(watch, 2.0, at, odom, hits=ROOM) == ""
+    doors = np.concatenate([ROOM[:80], ROOM[80:] * 1.5])  # most of the room opened into new ground
+    assert told(watch, 2.1, at, odom, quality=0.3, known=0.4, hits=doors) == ""
+    assert told(watch, 2.2, at, odom, quality=0.0, known=0.0, hits=ROOM[:40] * 1.5) == ""  # little in sight
+    assert told(watch, 3.0, at, odom, quality=0.0, known=0.0, hits=ROOM * 0.7) == ""  # too long ago
+    turned = np.array([0, 1.9, np.pi / 2 + 0.2])
+    seen = transform(np.array([0.0, 0.0, -0.2]), ROOM * 0.7)
+    assert (
+        told(watch, 3.1, [1.9, 0, 0.2], turned, quality=0.0, known=0.0, hits=seen) == ""
+    )  # wheels tell of it
 
 
 def test_the_first_scan_after_a_blind_stretch_may_correct_the_wheels():
