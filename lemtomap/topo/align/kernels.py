@@ -86,8 +86,11 @@ def collect_hits(
     out = np.empty((max(0, high_row - low_row + 1) * max(0, high_col - low_col + 1), 4))
     count = 0
     for row in range(low_row, high_row + 1):
+        r, c = row % size, low_col % size - 1
         for col in range(low_col, high_col + 1):
-            r, c = row % size, col % size
+            c += 1
+            if c == size:  # a division for each of 160,000 cells would be most of the work
+                c = 0
             if not taken[r, c] or owner[r, c, 0] != row or owner[r, c, 1] != col:
                 continue
             if sums[r, c, 2] < least or sums[r, c, 3] < since:
