@@ -137,7 +137,7 @@ class LocalMap:
         solution = solve_local(problem, poses, ~np.array(free), SOLVE_ITERATIONS)
         solved = compose(grid_poses[0], solution.poses)
         return {
-            node_id: replace(standing, T_grid_node=pose) if loose else standing
+            node_id: Standing(pose, standing.covariance, anchored=False) if loose else standing
             for (node_id, standing), pose, loose in zip(settled.items(), solved, free, strict=True)
         }
 
