@@ -123,6 +123,7 @@ def _draw_walls(axes: Axes, walls: NDArray[np.float64]) -> None:
         cmap="Greys",
         vmax=max(1.0, float(np.quantile(shade[shade > 0], 0.9))),
         interpolation="antialiased",
+        interpolation_stage="data",  # colours of every cell would take 200 MB
         zorder=0,
     )
 
