@@ -1,6 +1,7 @@
 """The rolling window: a ring buffer of cells around the robot, and its shifts (thesis 3-4)."""
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -179,9 +180,11 @@ class Window:
         return GridView(stamp_s, out, self.resolution_m, corner)
 
 
+@cache
 def percent_table() -> NDArray[np.int8]:
     """Return int8 (256,): what evidence - 128 shows as, -1 unknown, else 0..100."""
     evidence = np.arange(-128, 128)
     percent = np.rint(100.0 / (1.0 + np.exp(-LOG_ODDS_PER_EVIDENCE * evidence))).astype(np.int8)
     percent[evidence == 0] = UNKNOWN_PERCENT
+    percent.setflags(write=False)
     return np.asarray(percent)

@@ -6,6 +6,8 @@ g2o and gtsam): the true relative pose is compose(T_source_target, xi), xi ~ N(0
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import hypot
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +94,30 @@ class Edge:
             return self.covariance
         turn = adjoint(self.T_source_target)
         return turn @ self.covariance @ turn.T
+
+
+class Leg(NamedTuple):
+    """An edge as seen from one end, in plain numbers: what a look over many thousand edges needs of each."""
+
+    edge_id: int
+    other_id: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    """Pose of the other end in this end's frame."""
+    length_m: float
+    shift_var: float
+    """Mean variance of the translation, m^2."""
+    turn_var: float
+    """rad^2."""
+
+    @classmethod
+    def along(cls, edge: Edge, node_id: int) -> "Leg":
+        """Return an edge as seen from the node."""
+        x_m, y_m, yaw_rad = edge.seen_from(node_id).tolist()
+        (xx, _, _), (_, yy, _), (_, _, turn_var) = edge.covariance.tolist()
+        other_id, length_m = edge.other(node_id), hypot(x_m, y_m)
+        return cls(edge.edge_id, other_id, x_m, y_m, yaw_rad, length_m, 0.5 * (xx + yy), turn_var)
 
 
 class OpeningState(StrEnum):

@@ -80,13 +80,14 @@ class LocalMap:
     def release_forgotten(self, grid: GridView) -> None:
         """Let go of nodes whose surroundings the window has forgotten."""
         rows, cols = grid.occupancy.shape
-        low = np.array(grid.origin_m) + EDGE_MARGIN_M
-        high = np.array(grid.origin_m) + np.array([cols, rows]) * grid.resolution_m - EDGE_MARGIN_M
+        low_x, low_y = (at_m + EDGE_MARGIN_M for at_m in grid.origin_m)
+        high_x = grid.origin_m[0] + cols * grid.resolution_m - EDGE_MARGIN_M
+        high_y = grid.origin_m[1] + rows * grid.resolution_m - EDGE_MARGIN_M
         for node_id, standing in self.standings.items():
             if not standing.anchored:
                 continue
-            x, y = standing.T_grid_node[0], standing.T_grid_node[1]
-            if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
+            x, y, _ = standing.T_grid_node.tolist()
+            if not (low_x <= x <= high_x and low_y <= y <= high_y):
                 self.standings[node_id] = replace(standing, anchored=False)
 
     def settle(self, associated_id: int) -> None:
@@ -137,7 +138,7 @@ class LocalMap:
         solution = solve_local(problem, poses, ~np.array(free), SOLVE_ITERATIONS)
         solved = compose(grid_poses[0], solution.poses)
         return {
-            node_id: replace(standing, T_grid_node=pose) if loose else standing
+            node_id: Standing(pose, standing.covariance, anchored=False) if loose else standing
             for (node_id, standing), pose, loose in zip(settled.items(), solved, free, strict=True)
         }
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, adjoint, compose
+from lemtomap.se2 import Pose, compose
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.doubt import COVARIANCE_FLOOR, NOWHERE, relative_to_window
 from lemtomap.topo.events import NavEvent, NothingKnownHere
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
@@ -23,11 +24,6 @@ from lemtomap.topo.trail import ScanTrail
 from lemtomap.topo.undoing import take_back
 from lemtomap.topo.whereabouts import pose_quality
 from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
-
-COVARIANCE_FLOOR = np.diag([0.002**2, 0.002**2, np.deg2rad(0.1) ** 2])
-"""No relation between two places is known better: a tenth of a grid cell's quantisation noise."""
-NOWHERE = np.diag([1e6, 1e6, 1e3])
-"""Of the first scan's place against the scan before: none, or one from where the robot was carried away."""
 
 
 @dataclass(slots=True)
@@ -221,7 +217,7 @@ class TopoMapper:
         area_id = self.graph.node(self._associated_id).area_id if self._associated_id else 1
         node = self.graph.add_node(area_id=area_id, level=self.level, created_s=now.slam.stamp_s)
         T_grid_node = np.array(now.slam.T_grid_base, dtype=np.float64)
-        covariance = _relative_to_window(now.slam)
+        covariance = relative_to_window(now.slam)
         self.local.anchor(node.node_id, T_grid_node, covariance, born=True, seen=COVARIANCE_FLOOR)
         self.keeper.due(node.node_id)
         self._associated_id = node.node_id
@@ -243,7 +239,7 @@ class TopoMapper:
             if not self._transform.measured:
                 self.local.doubt(node_id, self.config.align_widen, self.config.align_widest_m)
         standing = self.local.standings[node_id]
-        seen = _relative_to_window(self._require().slam)
+        seen = relative_to_window(self._require().slam)
         self._drift = chain_covariance(standing.covariance, self.T_node_base, seen)
         self.local.settle(node_id)
 
@@ -419,13 +415,3 @@ class TopoMapper:
         if self._now is None:
             raise NotStarted("the mapper has seen no scan yet")
         return self._now
-
-
-def _turned(yaw_rad: float) -> Covariance:
-    return adjoint(np.array([0.0, 0.0, yaw_rad]))
-
-
-def _relative_to_window(slam: SlamUpdate) -> Covariance:
-    """Return the covariance of T_grid_base relative to the window, axes of base."""
-    turn = _turned(-float(slam.T_grid_base[2]))
-    return np.asarray(turn @ slam.covariance @ turn.T) + COVARIANCE_FLOOR

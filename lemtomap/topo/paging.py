@@ -3,14 +3,15 @@
 import heapq
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
-from lemtomap.topo.graph import Edge, Node
+from lemtomap.topo.graph import Edge, Leg, Node
 from lemtomap.topo.store import TopoStore
 
+LEGS_PER_NODE = 4  # legs are kept of so many times the nodes: in plain numbers they are small
 
-@dataclass(frozen=True, slots=True)
-class Reached:
+
+class Reached(NamedTuple):
     """A node within reach, and how it was reached."""
 
     node_id: int
@@ -33,6 +34,7 @@ class PagedGraph:
         self._edges: OrderedDict[int, tuple[Edge, ...]] = OrderedDict()
         self._ways: dict[int, list[tuple[int, float, Edge]]] = {}
         """Other end, length and edge, of nodes whose edges are in memory and were asked for their ways."""
+        self._legs: OrderedDict[int, tuple[Leg, ...]] = OrderedDict()
 
     def node(self, node_id: int) -> Node:
         """Return a node. Raises KeyError for one the map does not have."""
@@ -53,6 +55,18 @@ class PagedGraph:
         else:
             self._edges.move_to_end(node_id)
         return edges
+
+    def legs_of(self, node_id: int) -> Sequence[Leg]:
+        """Return the edges at a node as seen from it, in the order of `edges_of`."""
+        legs = self._legs.get(node_id)
+        if legs is None:
+            legs = tuple(Leg.along(edge, node_id) for edge in self.edges_of(node_id))
+            self._legs[node_id] = legs
+            if len(self._legs) > LEGS_PER_NODE * self._capacity:
+                self._legs.popitem(last=False)
+        else:
+            self._legs.move_to_end(node_id)
+        return legs
 
     def edge_between(self, a: int, b: int) -> Edge | None:
         """Return an edge that joins two nodes, None when there is none."""
@@ -75,6 +89,7 @@ class PagedGraph:
         ends = {end: self.edges_of(end) for end in (edge.source_id, edge.target_id)}
         edge = self.store.add_edge(edge)
         for end, edges in ends.items():
+            self._legs.pop(end, None)
             self._keep_edges(end, (*edges, edge))
         return edge
 
@@ -94,6 +109,7 @@ class PagedGraph:
             self._nodes.pop(node_id, None)
             self._edges.pop(node_id, None)
             self._ways.pop(node_id, None)
+            self._legs.pop(node_id, None)
 
     def reach(self, start_id: int, radius_m: float, limit: int = 1 << 30) -> dict[int, Reached]:
         """Return the nodes within a topological distance of one node, nearest first (Dijkstra).

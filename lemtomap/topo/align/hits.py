@@ -24,7 +24,7 @@ class HitMap:
     """Mean hit of each cell, in the grid frame."""
 
     def __init__(self, size_m: float = 24.0, recent_m: float = RECENT_M) -> None:
-        cells = round(size_m / CELL_M)
+        cells = 8 * math.ceil(size_m / (8.0 * CELL_M) - 1e-9)
         self._owner = np.full((cells, cells, 2), np.iinfo(np.int32).min, np.int32)
         self._taken = np.zeros((cells, cells), np.int8)
         self._sums = np.zeros((cells, cells, 6))

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lemtomap.se2 import Pose, adjoint, wrap_angle
-from lemtomap.topo.graph import Covariance, Edge
+from lemtomap.topo.graph import Covariance, Edge, Leg
 from lemtomap.topo.loops.config import AuditConfig, GateConfig
-from lemtomap.topo.loops.outlook import EdgeSource, Expected, Outlook
+from lemtomap.topo.loops.outlook import Expected, LegSource, Outlook
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.types import EdgeType
 
@@ -38,12 +38,12 @@ class Trial:
 class Without:
     """A graph without some of its edges."""
 
-    graph: EdgeSource
+    graph: LegSource
     edge_ids: frozenset[int]
 
-    def edges_of(self, node_id: int) -> Sequence[Edge]:
-        """Return the edges at a node."""
-        return [edge for edge in self.graph.edges_of(node_id) if edge.edge_id not in self.edge_ids]
+    def legs_of(self, node_id: int) -> Sequence[Leg]:
+        """Return the edges at a node as seen from it."""
+        return [leg for leg in self.graph.legs_of(node_id) if leg.edge_id not in self.edge_ids]
 
 
 @dataclass(slots=True)
@@ -62,6 +62,8 @@ class Audit:
     config: AuditConfig
     gate: GateConfig
     _trial_of: dict[int, Trial] = field(default_factory=dict)
+    _accused: bool = False
+    """Whether anything was said against a trial since `lost` was last asked."""
     _due: deque[Trial] = field(default_factory=deque)
     _round: _Round | None = None
 
@@ -100,6 +102,7 @@ class Audit:
                 trial.confirmed += 1
             else:
                 trial.contradicted += 1
+                self._accused = True
 
     def advance(self, nodes: int) -> None:
         """Look a slice further for the way round the next closure due."""
@@ -122,6 +125,9 @@ class Audit:
 
     def lost(self) -> list[Trial]:
         """Return the trials that are lost and forget them; the others then start without blame."""
+        if not self._accused:
+            return []
+        self._accused = False
         gone = [trial for trial in self._trials() if trial.is_lost(self.config)]
         for trial in gone:
             for edge in trial.edges:
@@ -147,6 +153,7 @@ class Audit:
             return
         weakest = min([trial, *others], key=lambda each: each.support + each.confirmed)
         weakest.contradicted += self.config.least_against if others else 1_000
+        self._accused = True
 
     def _on_way(self, outlook: Outlook, node_id: int) -> list[Trial]:
         """Return the trials with a closure on the way the outlook went to a node."""

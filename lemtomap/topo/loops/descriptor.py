@@ -9,6 +9,8 @@ every component about equally (0.025), so plain distances need no whitening.
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.topo.loops.cells import first_of
+
 WAVE_NUMBERS = (0.6, 0.9, 1.3, 1.9, 2.8)  # rad per m: features of 2 to 10 m, less than a room to a room
 DIRECTIONS = 16  # of the wave vector over half a turn; the other half mirrors it
 HARMONICS = 4
@@ -17,8 +19,6 @@ SCALE = (
     400.0  # steps per unit: a revisit's usual change is 10 steps, and 0.64 is beyond any component but one
 )
 THIN_M = 0.1  # points nearer than this count once, so that a wall seen often weighs no more
-
-ROW = 1 << 20  # cells of one row: no place is 100 km wide
 
 _ANGLES = np.arange(DIRECTIONS) * np.pi / DIRECTIONS
 _WAVES = np.array(WAVE_NUMBERS)[:, None, None] * np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
@@ -31,8 +31,7 @@ def describe(points_node: NDArray[np.floating]) -> bytes:
     if len(points) == 0:
         return bytes(BYTES)
     cells = np.round(points / THIN_M).astype(np.int64)
-    _, first = np.unique(cells[:, 0] * ROW + cells[:, 1], return_index=True)
-    phases = ((cells[first] * THIN_M) @ _WAVES.reshape(-1, 2).T).astype(np.float32)
+    phases = ((cells[first_of(cells, by_cell=True)] * THIN_M) @ _WAVES.reshape(-1, 2).T).astype(np.float32)
     size = np.hypot(np.cos(phases).mean(axis=0), np.sin(phases).mean(axis=0))
     spectrum = np.abs(np.fft.rfft(size.reshape(len(WAVE_NUMBERS), DIRECTIONS), axis=1))[:, :HARMONICS]
     return np.minimum(255, np.round(SCALE * spectrum * _GAINS)).astype(np.uint8).tobytes()

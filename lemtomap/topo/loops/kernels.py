@@ -14,6 +14,8 @@ Values = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Blocks = NDArray[np.int32]
 
+MOST_SCORE = 100  # of one point
+
 
 @njit(nogil=True, cache=True)
 def pool(
@@ -127,6 +129,36 @@ def total(layer: Scores, cells: Blocks, col: int, row: int) -> int:
         if 0 <= c < cols and 0 <= r < rows:
             result += layer[r, c]
     return result
+
+
+@njit(nogil=True, cache=True)
+def totals(layer: Scores, cells: Blocks, col: int, row: int, side: int, least: int, keys: Indices) -> None:
+    """Put the sums of a layer's scores at cells moved by (col, row), and by `side` more, into keys, int64
+    (2, 2): [0, 1] is that at (col + side, row). Where none of the four can reach `least` anything below it.
+    """
+    rows, cols = layer.shape
+    count = cells.shape[0]
+    a, b, c, d = 0, 0, 0, 0
+    for i in range(count):
+        x, y = cells[i, 0] + col, cells[i, 1] + row
+        x2, y2 = x + side, y + side
+        if x >= 0 and x2 < cols and y >= 0 and y2 < rows:
+            a += layer[y, x]
+            b += layer[y, x2]
+            c += layer[y2, x]
+            d += layer[y2, x2]
+        else:
+            left, right = 0 <= x < cols, 0 <= x2 < cols
+            if 0 <= y < rows:
+                a += layer[y, x] if left else 0
+                b += layer[y, x2] if right else 0
+            if 0 <= y2 < rows:
+                c += layer[y2, x] if left else 0
+                d += layer[y2, x2] if right else 0
+        if i % 16 == 15 and max(a, b, c, d) + MOST_SCORE * (count - 1 - i) < least:
+            a = b = c = d = least - 1
+            break
+    keys[0, 0], keys[0, 1], keys[1, 0], keys[1, 1] = a, b, c, d
 
 
 @njit(nogil=True, cache=True)
@@ -271,6 +303,7 @@ def dig(
     work = 0
     pad = 1 << (stack.shape[0] - 1)
     cells = np.empty((points_cells.shape[0], 2), np.int32)
+    keys = np.empty((2, 2), np.int64)
     room = heap_key.shape[0] - 8
     while size > 0:
         key = heap_key[0]
@@ -295,7 +328,9 @@ def dig(
             if child_angle >= box[5]:
                 continue
             turned(points_cells, angle_0_rad + (child_angle + slack) * angle_step_rad, slack, pad, cells)
-            layer = stack[child_level + 1] if child_level > 0 else stack[0]
+            totals(
+                stack[child_level + 1] if child_level > 0 else stack[0], cells, col, row, side, least, keys
+            )
             for i in range(2):
                 child_row = row + i * side
                 if child_row >= box[3]:
@@ -314,10 +349,16 @@ def dig(
                     )
                     if covered:
                         continue
-                    child = total(layer, cells, child_col, child_row)
                     work += 1
-                    if child >= least:
+                    if keys[i, j] >= least:
                         size = _push(
-                            heap_key, heap_block, size, child, child_level, child_col, child_row, child_angle
+                            heap_key,
+                            heap_block,
+                            size,
+                            keys[i, j],
+                            child_level,
+                            child_col,
+                            child_row,
+                            child_angle,
                         )
     return 0, size, 0, 0, 0, 0, work

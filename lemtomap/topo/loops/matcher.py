@@ -97,14 +97,21 @@ class Reference:
             _falloff(config, self.cell_m),
             config.contradiction,
         )
-        self._stack: NDArray[np.int16] | None = None
         self.points_grid = np.ascontiguousarray(points_grid, dtype=np.float64)
-        self.normals = fitting.line_normals(self.points_grid, config.line_reach_m)
-        origin = np.array(grid.origin_m)
-        rows, cols = grid.occupancy.shape
-        self.index = fitting.nearest_index(
-            (self.points_grid - origin) / grid.resolution_m, rows, cols, config.nearest_m / grid.resolution_m
-        )
+        self._stack: NDArray[np.int16] | None = None
+        self._lines: tuple[Points, NDArray[np.int32]] | None = None
+
+    @property
+    def lines(self) -> tuple[Points, NDArray[np.int32]]:
+        """The normals of the hits' lines and the index of the hit nearest to each cell, made when needed."""
+        if self._lines is None:
+            config, grid = self.config, self.grid
+            normals = fitting.line_normals(self.points_grid, config.line_reach_m)
+            in_cells = (self.points_grid - np.array(grid.origin_m)) / grid.resolution_m
+            rows, cols = grid.occupancy.shape
+            reach = config.nearest_m / grid.resolution_m
+            self._lines = normals, fitting.nearest_index(in_cells, rows, cols, reach)
+        return self._lines
 
     @property
     def stack(self) -> NDArray[np.int16]:
@@ -128,8 +135,7 @@ class Reference:
         found, info, used, residual_m = fitting.align(
             points_place,
             self.points_grid,
-            self.normals,
-            self.index,
+            *self.lines,
             origin_x,
             origin_y,
             grid.resolution_m,

@@ -8,14 +8,14 @@ to first order, for every pair of nodes, in one pass without matrices.
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, hypot, sin
-from typing import Protocol
+from math import cos, sin
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between
-from lemtomap.topo.graph import Edge
+from lemtomap.topo.graph import Leg
 from lemtomap.topo.loops.config import GateConfig
 
 # Columns of a node's sums: translation variance, heading variance, and that times the place of each edge
@@ -24,11 +24,11 @@ SHIFT, TURN, TURN_X, TURN_Y, TURN_XX, TURN_XY, TURN_YY = range(7)
 Sums = NDArray[np.float64]
 
 
-class EdgeSource(Protocol):
+class LegSource(Protocol):
     """What the outlook reads of a graph."""
 
-    def edges_of(self, node_id: int) -> Sequence[Edge]:
-        """Return the edges at a node."""
+    def legs_of(self, node_id: int) -> Sequence[Leg]:
+        """Return the edges at a node as seen from it."""
         ...
 
 
@@ -43,8 +43,7 @@ class Expected:
     """Length of the way over edges."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
+class _Known(NamedTuple):
     x_m: float
     y_m: float
     yaw_rad: float
@@ -57,7 +56,7 @@ class _Known:
 class Outlook:
     """Expected poses of the nodes around one anchor node, found a slice at a time, surest first."""
 
-    def __init__(self, graph: EdgeSource, anchor_id: int, config: GateConfig) -> None:
+    def __init__(self, graph: LegSource, anchor_id: int, config: GateConfig) -> None:
         self.anchor_id = anchor_id
         self._graph = graph
         self._config = config
@@ -91,9 +90,11 @@ class Outlook:
     def extend(self, node_id: int) -> None:
         """Reach a node made since the outlook began, over its surest edge to a node already reached."""
         ways = [
-            self._step(self._known[other_id], edge, other_id)
-            for edge in self._graph.edges_of(node_id)
-            if (other_id := edge.other(node_id)) in self._known
+            self._step(self._known[leg.other_id], back, leg.other_id)
+            for leg in self._graph.legs_of(node_id)
+            if leg.other_id in self._known
+            for back in self._graph.legs_of(leg.other_id)
+            if back.other_id == node_id
         ]
         if ways:
             cost, known = min(ways, key=lambda way: way[0])
@@ -105,20 +106,17 @@ class Outlook:
             self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
         self._rows[len(self._ids)] = (known.x_m, known.y_m, known.yaw_rad, known.way_m, *known.sums)
         self._ids.append(node_id)
-        for edge in self._graph.edges_of(node_id):
-            other_id = edge.other(node_id)
-            if other_id not in self._known:
+        for leg in self._graph.legs_of(node_id):
+            if leg.other_id not in self._known:
                 self._pushed += 1
-                step_cost, after = self._step(known, edge, node_id)
-                heapq.heappush(self._queue, (cost + step_cost, self._pushed, other_id, after))
+                step_cost, after = self._step(known, leg, node_id)
+                heapq.heappush(self._queue, (cost + step_cost, self._pushed, leg.other_id, after))
 
-    def _step(self, known: _Known, edge: Edge, node_id: int) -> tuple[float, _Known]:
+    def _step(self, known: _Known, leg: Leg, node_id: int) -> tuple[float, _Known]:
         """Return what crossing an edge costs (doubt, so that well measured ways win) and where it leads."""
-        dx, dy, turn = edge.seen_from(node_id).tolist()
-        length = hypot(dx, dy)
+        _, _, dx, dy, turn, length, shift_var, turn_var = leg
         config = self._config
-        (xx, _, _), (_, yy, _), (_, _, turn_var) = edge.covariance.tolist()
-        shift_var = 0.5 * (xx + yy) + config.shift_var_per_m * length
+        shift_var += config.shift_var_per_m * length
         turn_var += config.turn_var_per_m * length
         c, s = cos(known.yaw_rad), sin(known.yaw_rad)
         x, y = known.x_m + c * dx - s * dy, known.y_m + s * dx + c * dy

@@ -15,7 +15,8 @@ Levels = NDArray[np.int8]
 Table = NDArray[np.int64]
 Values = NDArray[np.float64]
 
-ONE = 65536
+ONE_BITS = 16
+ONE = 1 << ONE_BITS
 LIMIT = 60  # how far back a context remembers: steady in a small picture
 BITMAP_CONTEXTS = 128
 LEVELS = 5  # offsets -2..2
@@ -39,49 +40,53 @@ def fresh_tables() -> Table:
     return tables
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, inline="always")
 def learn(tables: Table, context: int, bit: int) -> None:
     """Move a context's probability towards what it has just seen."""
-    seen = tables[context, 1]
-    tables[context, 0] += ((bit * ONE) - tables[context, 0]) // (seen + 2)
-    tables[context, 0] = min(max(tables[context, 0], 32), ONE - 32)
+    seen, chance = tables[context, 1], tables[context, 0]
+    chance += (bit * ONE - chance) // (seen + 2)
+    tables[context, 0] = min(max(chance, 32), ONE - 32)
     if seen < LIMIT:
         tables[context, 1] = seen + 1
 
 
-@njit(nogil=True, cache=True)
-def put_bit(state: Table, out: Bits, tables: Table, context: int, bit: int) -> None:
-    """Narrow the interval; state is [low, high, bytes written]."""
-    middle = state[0] + ((state[1] - state[0]) * tables[context, 0]) // ONE
+@njit(nogil=True, cache=True, inline="always")
+def put_bit(
+    low: int, high: int, at: int, out: Bits, tables: Table, context: int, bit: int
+) -> tuple[int, int, int]:
+    """Narrow the interval [low, high]; return it and the bytes written."""
+    middle = low + ((high - low) * tables[context, 0] >> ONE_BITS)
     if bit:
-        state[1] = middle
+        high = middle
     else:
-        state[0] = middle + 1
+        low = middle + 1
     learn(tables, context, bit)
-    while (state[0] ^ state[1]) & 0xFF000000 == 0:
-        out[state[2]] = state[1] >> 24
-        state[2] += 1
-        state[0] = (state[0] << 8) & 0xFFFFFFFF
-        state[1] = ((state[1] << 8) & 0xFFFFFFFF) | 255
+    while (low ^ high) & 0xFF000000 == 0:
+        out[at] = high >> 24
+        at += 1
+        low = (low << 8) & 0xFFFFFFFF
+        high = ((high << 8) & 0xFFFFFFFF) | 255
+    return low, high, at
 
 
-@njit(nogil=True, cache=True)
-def get_bit(state: Table, data: Bits, tables: Table, context: int) -> int:
-    """Return the next bit; state is [low, high, bytes read, code]. Zeros follow the end of the data."""
-    middle = state[0] + ((state[1] - state[0]) * tables[context, 0]) // ONE
-    bit = 1 if state[3] <= middle else 0
+@njit(nogil=True, cache=True, inline="always")
+def get_bit(
+    low: int, high: int, at: int, code: int, data: Bits, tables: Table, context: int
+) -> tuple[int, int, int, int, int]:
+    """Return the next bit, the interval, the bytes read and the code; zeros follow the end of the data."""
+    middle = low + ((high - low) * tables[context, 0] >> ONE_BITS)
+    bit = 1 if code <= middle else 0
     if bit:
-        state[1] = middle
+        high = middle
     else:
-        state[0] = middle + 1
+        low = middle + 1
     learn(tables, context, bit)
-    while (state[0] ^ state[1]) & 0xFF000000 == 0:
-        state[0] = (state[0] << 8) & 0xFFFFFFFF
-        state[1] = ((state[1] << 8) & 0xFFFFFFFF) | 255
-        following = data[state[2]] if state[2] < data.shape[0] else 0
-        state[3] = ((state[3] << 8) & 0xFFFFFFFF) | following
-        state[2] += 1
-    return bit
+    while (low ^ high) & 0xFF000000 == 0:
+        low = (low << 8) & 0xFFFFFFFF
+        high = ((high << 8) & 0xFFFFFFFF) | 255
+        code = ((code << 8) & 0xFFFFFFFF) | (data[at] if at < data.shape[0] else 0)
+        at += 1
+    return bit, low, high, at, code
 
 
 @njit(nogil=True, cache=True)
@@ -136,11 +141,12 @@ def encode(bitmap: Bits, levels: Levels, sides: Levels, reach: int) -> Bits:
     """
     rows, cols = bitmap.shape
     out = np.zeros(rows * cols + 16, np.uint8)
-    state = np.array([0, 0xFFFFFFFF, 0], np.int64)
+    low, high, at = 0, 0xFFFFFFFF, 0
     tables = fresh_tables()
     for row in range(2, rows - 2):
         for col in range(2, cols - 2):
-            put_bit(state, out, tables, cell_context(bitmap, row, col), bitmap[row, col])
+            context = cell_context(bitmap, row, col)
+            low, high, at = put_bit(low, high, at, out, tables, context, bitmap[row, col])
     shape = cell_normals(bitmap, 1.0, reach)
     fronts = np.zeros((rows, cols, 2))
     k = -1
@@ -152,19 +158,20 @@ def encode(bitmap: Bits, levels: Levels, sides: Levels, reach: int) -> Bits:
             context, guess = side_guess(bitmap, fronts, row, col, shape[k])
             context = BITMAP_CONTEXTS + LEVEL_CONTEXTS + 2 * context
             side = sides[row, col]
-            put_bit(state, out, tables, context, 1 if side == 0 else 0)
+            low, high, at = put_bit(low, high, at, out, tables, context, 1 if side == 0 else 0)
             if side != 0:
-                put_bit(state, out, tables, context + 1, 1 if side != guess else 0)
+                turned = 1 if side != guess else 0
+                low, high, at = put_bit(low, high, at, out, tables, context + 1, turned)
             fronts[row, col, 0], fronts[row, col, 1] = side * shape[k, 2], side * shape[k, 3]
             base = BITMAP_CONTEXTS + 8 * level_context(bitmap, levels, row, col)
             value = levels[row, col] + LEVELS // 2
             node = 1
             for shift in range(2, -1, -1):
                 bit = (value >> shift) & 1
-                put_bit(state, out, tables, base + node, bit)
+                low, high, at = put_bit(low, high, at, out, tables, base + node, bit)
                 node = 2 * node + bit
-    out[state[2]] = (state[0] >> 24) + 1
-    end = state[2] + 1
+    out[at] = (low >> 24) + 1
+    end = at + 1
     while end > 0 and out[end - 1] == 0:
         end -= 1
     return out[:end].copy()
@@ -174,13 +181,15 @@ def encode(bitmap: Bits, levels: Levels, sides: Levels, reach: int) -> Bits:
 def decode(data: Bits, bitmap: Bits, levels: Levels, sides: Levels, reach: int) -> None:
     """Fill bitmap, levels and sides (all zero before) from coded data. Any data decodes to something."""
     rows, cols = bitmap.shape
-    state = np.array([0, 0xFFFFFFFF, 4, 0], np.int64)
+    low, high, at, code = 0, 0xFFFFFFFF, 4, 0
     for k in range(4):
-        state[3] = (state[3] << 8) | (data[k] if k < data.shape[0] else 0)
+        code = (code << 8) | (data[k] if k < data.shape[0] else 0)
     tables = fresh_tables()
     for row in range(2, rows - 2):
         for col in range(2, cols - 2):
-            bitmap[row, col] = get_bit(state, data, tables, cell_context(bitmap, row, col))
+            context = cell_context(bitmap, row, col)
+            bit, low, high, at, code = get_bit(low, high, at, code, data, tables, context)
+            bitmap[row, col] = bit
     shape = cell_normals(bitmap, 1.0, reach)
     fronts = np.zeros((rows, cols, 2))
     k = -1
@@ -192,14 +201,17 @@ def decode(data: Bits, bitmap: Bits, levels: Levels, sides: Levels, reach: int) 
             context, guess = side_guess(bitmap, fronts, row, col, shape[k])
             context = BITMAP_CONTEXTS + LEVEL_CONTEXTS + 2 * context
             side = 0
-            if not get_bit(state, data, tables, context):
-                side = -guess if get_bit(state, data, tables, context + 1) else guess
+            bit, low, high, at, code = get_bit(low, high, at, code, data, tables, context)
+            if not bit:
+                bit, low, high, at, code = get_bit(low, high, at, code, data, tables, context + 1)
+                side = -guess if bit else guess
             sides[row, col] = side
             fronts[row, col, 0], fronts[row, col, 1] = side * shape[k, 2], side * shape[k, 3]
             base = BITMAP_CONTEXTS + 8 * level_context(bitmap, levels, row, col)
             node = 1
             for _ in range(3):
-                node = 2 * node + get_bit(state, data, tables, base + node)
+                bit, low, high, at, code = get_bit(low, high, at, code, data, tables, base + node)
+                node = 2 * node + bit
             levels[row, col] = min(node - 8, LEVELS - 1) - LEVELS // 2
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import compose
-from lemtomap.topo.graph import Edge
+from lemtomap.topo.graph import Edge, Leg
 from lemtomap.topo.loops.candidates import search_box, spaced
 from lemtomap.topo.loops.cases import Situation
 from lemtomap.topo.loops.config import GateConfig
@@ -30,8 +30,8 @@ class Ring:
             self.at[k].append(edge)
             self.at[k + 1].append(edge)
 
-    def edges_of(self, node_id):
-        return self.at[node_id]
+    def legs_of(self, node_id):
+        return [Leg.along(edge, node_id) for edge in self.at[node_id]]
 
 
 def arrived(count, drift=(0.0, 0.0, 0.0)):

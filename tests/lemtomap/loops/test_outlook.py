@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import between, compose
-from lemtomap.topo.graph import Edge
+from lemtomap.topo.graph import Edge, Leg
 from lemtomap.topo.loops.config import GateConfig
 from lemtomap.topo.loops.outlook import Outlook
 from lemtomap.types import EdgeType
@@ -25,8 +25,8 @@ class Graph:
         self.at[a].append(edge)
         self.at[b].append(edge)
 
-    def edges_of(self, node_id):
-        return self.at[node_id]
+    def legs_of(self, node_id):
+        return [Leg.along(edge, node_id) for edge in self.at[node_id]]
 
 
 def chain(count):

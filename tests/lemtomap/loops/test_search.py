@@ -51,6 +51,20 @@ def slow_score(field, points_cells, col, row, angle):
     return int(field[r[inside], c[inside]].sum())
 
 
+def test_four_blocks_summed_at_once_are_those_summed_one_by_one_unless_none_can_reach_the_least():
+    rng = np.random.default_rng(5)
+    layer = rng.integers(-40, 101, (40, 50)).astype(np.int16)
+    cells = rng.integers(-6, 46, (100, 2)).astype(np.int32)
+    keys = np.empty((2, 2), np.int64)
+    for least in (-10_000, 1_500, 9_000):
+        for col, row, side in ((0, 0, 1), (-5, 3, 4), (30, -20, 8), (3, 2, 2)):
+            kernels.totals(layer, cells, col, row, side, least, keys)
+            each = [
+                [kernels.total(layer, cells, col + j * side, row + i * side) for j in (0, 1)] for i in (0, 1)
+            ]
+            assert keys.tolist() == each or (np.max(each) < least and keys.max() < least)
+
+
 def test_a_blocks_bound_is_never_below_any_pose_in_it():
     rng = np.random.default_rng(3)
     field = rng.integers(-40, 101, (40, 50)).astype(np.int16)
