@@ -24,7 +24,9 @@ from lemtomap.types import GridView, Odometry, Scan, SlamUpdate
 
 TILE = 20  # cells; windows move by whole tiles
 PACK_LEVEL = 1  # of zlib: most cells of a tile are alike
-OCCUPIED = np.dtype([("averaged", "u1"), ("mean", "u2", 2), ("lift", "i1"), ("normal", "u1")])
+OCCUPIED = np.dtype(
+    [("averaged", "u1"), ("mean", "u2", 2), ("whence", "i1", 2), ("lift", "i1"), ("normal", "u1")]
+)
 
 
 class ArchivedWindow(Window):

@@ -6,7 +6,8 @@ arrays.
 
 evidence  int8 (n, n)        0 never seen, negative free, positive occupied; bounded on both sides
 averaged  uint8 (n, n)       hits in the mean, saturates
-mean      uint16 (n, n, 2)  averaged hit point from the cell's corner, 65535 to the far corner
+mean      uint16 (n, n, 2)   averaged hit point from the cell's corner, 65535 to the far corner
+whence    int8 (n, n, 2)     from an occupied cell to the laser that hit it last, 127 long
 nearest   uint8 (n, n)       index into `offsets` (sorted by distance) of the nearest occupied cell; 255 none
 lift      int8 (n, n)        from the averaged hit to the plane along its normal, 254 to a cell's side
 normal    uint8 (n, n)       surface normal of an occupied cell, 180 / 255 degrees a step; 255 no plane
@@ -19,14 +20,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from lemtomap.grid.planes.kernels import FAR, renew_normal
+
 Array = NDArray[Any]
 
 NONE = 255
 WHOLE = 65535.0
-LIFTS = 254.0
-MIN_PLANE_POINTS = 4
-PLANE_RADIUS = 3
-PLANE_RATIO = 0.1
 
 
 @njit(nogil=True, cache=True)
@@ -71,60 +70,6 @@ def _orphan(
             orphans[count, 0], orphans[count, 1] = cx, cy
             count += 1
     return count
-
-
-@njit(nogil=True, cache=True)
-def _renew_normal(window: Any, gx: int, gy: int, seen_rad: float) -> None:
-    """Fit a plane through the averaged hit points around an occupied cell; where these are too few, the
-    plane is what the scan saw there, seen_rad in grid or NaN.
-    """
-    evidence, mean, normal, origin = window.evidence, window.mean, window.normal, window.origin
-    n = evidence.shape[0]
-    cells = 0
-    k = 0.0
-    sx = sy = sxx = sxy = syy = 0.0
-    for dy in range(-PLANE_RADIUS, PLANE_RADIUS + 1):
-        cy = gy + dy
-        if cy < origin[1] or cy >= origin[1] + n:
-            continue
-        row = cy % n
-        for dx in range(-PLANE_RADIUS, PLANE_RADIUS + 1):
-            cx = gx + dx
-            if cx < origin[0] or cx >= origin[0] + n:
-                continue
-            col = cx % n
-            if evidence[row, col] > 0:
-                x = dx + mean[row, col, 0] / WHOLE
-                y = dy + mean[row, col, 1] / WHOLE
-                w = float(window.averaged[row, col])
-                cells += 1
-                k += w
-                sx += w * x
-                sy += w * y
-                sxx += w * x * x
-                sxy += w * x * y
-                syy += w * y * y
-    normal[gy % n, gx % n] = NONE
-    if cells < MIN_PLANE_POINTS:
-        if not math.isnan(seen_rad):
-            normal[gy % n, gx % n] = int(seen_rad % math.pi * 255.0 / math.pi + 0.5) % 255
-            window.lift[gy % n, gx % n] = 0
-        return
-    sxx = sxx / k - sx / k * sx / k
-    sxy = sxy / k - sx / k * sy / k
-    syy = syy / k - sy / k * sy / k
-    half = 0.5 * (sxx - syy)
-    root = math.sqrt(half * half + sxy * sxy)
-    middle = 0.5 * (sxx + syy)
-    if middle - root > PLANE_RATIO * (middle + root):
-        return
-    along = 0.5 * math.atan2(sxy, half)
-    angle = (along + 0.5 * math.pi) % math.pi
-    row, col = gy % n, gx % n
-    normal[row, col] = int(angle * 255.0 / math.pi + 0.5) % 255
-    off = (sx / k - mean[row, col, 0] / WHOLE) * math.cos(angle)
-    off += (sy / k - mean[row, col, 1] / WHOLE) * math.sin(angle)
-    window.lift[row, col] = int(min(max(round(off * LIFTS), -127), 127))
 
 
 @njit(nogil=True, cache=True)
@@ -213,13 +158,16 @@ def integrate(
     rules int64: hit, miss, floor, ceiling, bound of the mean. laser (2,) in base, metres. scratch int64
     (3, many, 2).
     """
-    evidence, averaged, mean = window.evidence, window.averaged, window.mean
+    evidence, averaged, mean, whence = window.evidence, window.averaged, window.mean, window.whence
     nearest, origin = window.nearest, window.origin
     n = evidence.shape[0]
     hit, miss, floor, ceiling, bound = rules[0], rules[1], rules[2], rules[3], rules[4]
     c, s = math.cos(T_grid_base[2]), math.sin(T_grid_base[2])
     touched, lost, orphans = np.empty(hits.shape[0], dtype=np.int64), scratch[0], scratch[1]
     touched_count = lost_count = orphan_count = 0
+    ray = np.empty(4)
+    ray[0] = T_grid_base[0] + c * laser[0] - s * laser[1]
+    ray[1] = T_grid_base[1] + s * laser[0] + c * laser[1]
     for i in range(hits.shape[0]):
         x = T_grid_base[0] + c * hits[i, 0] - s * hits[i, 1]
         y = T_grid_base[1] + s * hits[i, 0] + c * hits[i, 1]
@@ -240,10 +188,9 @@ def integrate(
                 averaged[row, col] = 0
                 if after > 0:
                     _spread_new(nearest, offsets, n, origin, gx, gy)
+            per_m = FAR / max(math.hypot(ray[0] - x, ray[1] - y), resolution)
+            whence[row, col, 0], whence[row, col, 1] = per_m * (ray[0] - x), per_m * (ray[1] - y)
         _average_hit(averaged, mean, row, col, x / resolution - gx, y / resolution - gy, bound)
-    ray = np.empty(4)
-    ray[0] = T_grid_base[0] + c * laser[0] - s * laser[1]
-    ray[1] = T_grid_base[1] + s * laser[0] + c * laser[1]
     for i in range(hits.shape[0] + cuts.shape[0]):
         if i < hits.shape[0]:
             px, py = hits[i, 0], hits[i, 1]
@@ -263,7 +210,7 @@ def integrate(
         gx = math.floor((T_grid_base[0] + c * hits[k, 0] - s * hits[k, 1]) / resolution)
         gy = math.floor((T_grid_base[1] + s * hits[k, 0] + c * hits[k, 1]) / resolution)
         if evidence[gy % n, gx % n] > 0:
-            _renew_normal(window, gx, gy, normals_rad[k] + T_grid_base[2])
+            renew_normal(window, gx, gy, normals_rad[k] + T_grid_base[2])
 
 
 @njit(nogil=True, cache=True)
@@ -379,6 +326,7 @@ def paste(
     evidence: Array,
     averaged: Array,
     mean: Array,
+    whence: Array,
     lift: Array,
     normal: Array,
 ) -> None:
@@ -394,6 +342,8 @@ def paste(
             window.averaged[row, col] = averaged[dy, dx]
             window.mean[row, col, 0] = mean[dy, dx, 0]
             window.mean[row, col, 1] = mean[dy, dx, 1]
+            window.whence[row, col, 0] = whence[dy, dx, 0]
+            window.whence[row, col, 1] = whence[dy, dx, 1]
             window.lift[row, col] = lift[dy, dx]
             window.normal[row, col] = normal[dy, dx]
             if evidence[dy, dx] > 0:

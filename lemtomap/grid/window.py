@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lemtomap.grid import kernels
 from lemtomap.grid.config import SlamConfig
+from lemtomap.grid.planes import kernels as planes
 from lemtomap.grid.scan import Beams
 from lemtomap.grid.scan import kernels as scan_kernels
 from lemtomap.se2 import Pose, transform
@@ -25,6 +26,7 @@ class WindowArrays(NamedTuple):
     evidence: NDArray[np.int8]
     averaged: NDArray[np.uint8]
     mean: NDArray[np.uint16]
+    whence: NDArray[np.int8]
     lift: NDArray[np.int8]
     nearest: NDArray[np.uint8]
     normal: NDArray[np.uint8]
@@ -75,6 +77,7 @@ class Window:
             evidence=np.zeros((n, n), dtype=np.int8),
             averaged=np.zeros((n, n), dtype=np.uint8),
             mean=np.zeros((n, n, 2), dtype=np.uint16),
+            whence=np.zeros((n, n, 2), dtype=np.int8),
             lift=np.zeros((n, n), dtype=np.int8),
             nearest=np.full((n, n), kernels.NONE, dtype=np.uint8),
             normal=np.full((n, n), kernels.NONE, dtype=np.uint8),
@@ -123,14 +126,23 @@ class Window:
     def known_share(self, beams: Beams, T_grid_base: Pose) -> float:
         """Return the share of hits, 0..1, in cells that the window knows anything of; 0 without hits.
 
-        It is small on new ground, where there is nothing to match, and large where odometry is wrong.
+        It is small on new ground, where there is nothing to match, and large where odometry is wrong. A wall
+        seen only from its other side is new ground.
         """
         if len(beams.hits) == 0:
             return 0.0
-        n, origin = self.cells, self.arrays.origin
-        cells = np.floor(transform(T_grid_base, beams.hits) / self.resolution_m).astype(np.int64)
-        inside = cells[((cells >= origin) & (cells < origin + n)).all(axis=1)] % n
-        known = np.count_nonzero(self.arrays.evidence[inside[:, 1], inside[:, 0]])
+        n, origin, arrays = self.cells, self.arrays.origin, self.arrays
+        points = transform(T_grid_base, beams.hits)
+        cells = np.floor(points / self.resolution_m).astype(np.int64)
+        inside = ((cells >= origin) & (cells < origin + n)).all(axis=1)
+        col, row = cells[inside].T % n
+        to_laser = transform(T_grid_base, beams.laser_base[:2]) - points[inside]
+        normals = self._tables.normals[arrays.normal[row, col]]
+        now = np.sum(normals * to_laser, axis=1) / np.hypot(*to_laser.T)
+        then = np.sum(normals * arrays.whence[row, col], axis=1) / planes.FAR
+        has_face = (arrays.evidence[row, col] > 0) & (arrays.normal[row, col] != kernels.NONE)
+        behind = has_face & (now * then < 0.0) & (np.minimum(abs(now), abs(then)) >= planes.GLANCE)
+        known = np.count_nonzero((arrays.evidence[row, col] != 0) & ~behind)
         return known / len(beams.hits)
 
     def centred_origin(self, T_grid_base: Pose) -> tuple[int, int]:

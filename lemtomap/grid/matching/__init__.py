@@ -91,6 +91,7 @@ class Matcher:
         kernels.match(
             beams.hits,
             beams.normals_rad,
+            beams.laser_base,
             prior,
             (1.0 / uncertainty.sigma_m**2, 1.0 / uncertainty.sigma_rad**2),
             window.arrays,

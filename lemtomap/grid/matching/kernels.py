@@ -12,6 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from lemtomap.grid.planes.kernels import is_other_face
+from lemtomap.grid.searching.kernels import climb, sweep
+
 Array = NDArray[Any]
 Pair = tuple[float, float]
 
@@ -24,6 +27,7 @@ LIFTS = 254.0
 def _linearise(
     points: Array,
     normals_rad: Array,
+    laser: Array,
     pose: Array,
     window: Any,
     tables: Any,
@@ -36,12 +40,14 @@ def _linearise(
     spread).
     """
     mean, nearest, normal, origin = window.mean, window.nearest, window.normal, window.origin
+    whence = window.whence
     offsets, normals = tables.offsets, tables.normals
     resolution, point_weight = rules.resolution_m, rules.point_weight
     n = nearest.shape[0]
     H[:] = 0.0
     b[:] = 0.0
     c, s = math.cos(pose[2]), math.sin(pose[2])
+    laser_x, laser_y = c * laser[0] - s * laser[1], s * laser[0] + c * laser[1]
     total = 0.0
     corner_x, corner_y = origin[0] * resolution, origin[1] * resolution
     ring_x, ring_y = origin[0] % n, origin[1] % n
@@ -82,19 +88,23 @@ def _linearise(
         ey = (row + dy) * resolution + mean[at_row, at_col, 1] * per_whole - y
         k = normal[at_row, at_col]
         w = math.exp(scale * (ex * ex + ey * ey))
-        total += w
         if k != NONE:
             nx, ny = normals[k, 0], normals[k, 1]
+            if is_other_face(nx, ny, whence[at_row, at_col], laser_x - rx, laser_y - ry):
+                continue
             off = window.lift[at_row, at_col] * per_lift
             ex += off * nx
             ey += off * ny
             wxx, wxy, wyy = w * nx * nx, w * nx * ny, w * ny * ny
         elif not math.isnan(normals_rad[i]):
             nx, ny = math.cos(normals_rad[i] + pose[2]), math.sin(normals_rad[i] + pose[2])
+            if is_other_face(nx, ny, whence[at_row, at_col], laser_x - rx, laser_y - ry):
+                continue
             wxx, wxy, wyy = w * nx * nx, w * nx * ny, w * ny * ny
         else:
             wxx = wyy = point_weight * w
             wxy = 0.0
+        total += w
         jx, jy = -ry, rx
         gx, gy = wxx * ex + wxy * ey, wxy * ex + wyy * ey
         hxx += wxx
@@ -177,111 +187,10 @@ def _solve(A: Array, b: Array, x: Array) -> bool:
 
 
 @njit(nogil=True, cache=True)
-def score(
-    points: Array, stride: int, x0: float, y0: float, yaw: float, window: Any, tables: Any, resolution: float
-) -> float:
-    """Return the mean closeness (0..1) of every stride-th point to the window's occupied cells."""
-    nearest, origin, closeness = window.nearest, window.origin, tables.closeness
-    n = nearest.shape[0]
-    c, s = math.cos(yaw), math.sin(yaw)
-    base_x, base_y = x0 - origin[0] * resolution, y0 - origin[1] * resolution
-    ring_x, ring_y = origin[0] % n, origin[1] % n
-    per_metre = 1.0 / resolution
-    total = 0.0
-    count = 0
-    for i in range(0, points.shape[0], stride):
-        count += 1
-        x = base_x + c * points[i, 0] - s * points[i, 1]
-        y = base_y + s * points[i, 0] + c * points[i, 1]
-        if x < 0.0 or y < 0.0:
-            continue
-        col, row = int(x * per_metre), int(y * per_metre)
-        if col >= n or row >= n:
-            continue
-        col += ring_x
-        if col >= n:
-            col -= n
-        row += ring_y
-        if row >= n:
-            row -= n
-        total += closeness[nearest[row, col]]
-    return total / count
-
-
-@njit(nogil=True, cache=True)
-def _unlikelihood(x: float, y: float, yaw: float, prior: Array, prior_info: Pair) -> float:
-    """Return the squared Mahalanobis distance of a pose from the prior."""
-    dx, dy = x - prior[0], y - prior[1]
-    dt = (yaw - prior[2] + math.pi) % (2.0 * math.pi) - math.pi
-    return float(prior_info[0] * (dx * dx + dy * dy) + prior_info[1] * dt * dt)
-
-
-@njit(nogil=True, cache=True)
-def _climb(
-    points: Array, pose: Array, prior: Array, prior_info: Pair, window: Any, tables: Any, rules: Any
-) -> None:
-    """Walk uphill from pose (changed in place) in ever smaller steps."""
-    resolution, trust = rules.resolution_m, rules.climb_trust
-    step_m, step_rad = rules.climb_step_m, rules.climb_step_rad
-    best = score(points, 1, pose[0], pose[1], pose[2], window, tables, resolution)
-    best -= trust * _unlikelihood(pose[0], pose[1], pose[2], prior, prior_info)
-    halvings = 0
-    while halvings < rules.climb_rounds:
-        from_x, from_y, from_yaw = pose[0], pose[1], pose[2]
-        better = False
-        for move in range(6):
-            x, y, yaw = from_x, from_y, from_yaw
-            sign = 1.0 if move % 2 == 0 else -1.0
-            if move < 2:
-                x += sign * step_m
-            elif move < 4:
-                y += sign * step_m
-            else:
-                yaw += sign * step_rad
-            value = score(points, 1, x, y, yaw, window, tables, resolution)
-            value -= trust * _unlikelihood(x, y, yaw, prior, prior_info)
-            if value > best:
-                best = value
-                pose[0], pose[1], pose[2] = x, y, yaw
-                better = True
-        if not better:
-            step_m *= 0.5
-            step_rad *= 0.5
-            halvings += 1
-
-
-@njit(nogil=True, cache=True)
-def _sweep(
-    points: Array,
-    pose: Array,
-    prior: Array,
-    prior_info: Pair,
-    window: Any,
-    tables: Any,
-    rules: Any,
-    reach_rad: float,
-    reach_m: float,
-) -> None:
-    """Try headings and places all round the prior with every third point; leave the best in pose."""
-    best = -1e30
-    yaw_steps, steps = int(reach_rad / rules.sweep_step_rad), int(reach_m / rules.sweep_step_m)
-    for k in range(-yaw_steps, yaw_steps + 1):
-        yaw = prior[2] + k * rules.sweep_step_rad
-        for j in range(-steps, steps + 1):
-            y = prior[1] + j * rules.sweep_step_m
-            for i in range(-steps, steps + 1):
-                x = prior[0] + i * rules.sweep_step_m
-                value = score(points, 3, x, y, yaw, window, tables, rules.resolution_m)
-                value -= rules.climb_trust * _unlikelihood(x, y, yaw, prior, prior_info)
-                if value > best:
-                    best = value
-                    pose[0], pose[1], pose[2] = x, y, yaw
-
-
-@njit(nogil=True, cache=True)
 def _refine(
     points: Array,
     normals_rad: Array,
+    laser: Array,
     pose: Array,
     prior: Array,
     prior_info: Pair,
@@ -301,7 +210,7 @@ def _refine(
     sigma = rules.sigma_m
     width = 2.0 * sigma
     for _ in range(rules.newton_rounds):
-        total = _linearise(points, normals_rad, pose, window, tables, rules, width, H, b)
+        total = _linearise(points, normals_rad, laser, pose, window, tables, rules, width, H, b)
         _gate(H, b, rules.degenerate_below)
         dx, dy = prior[0] - pose[0], prior[1] - pose[1]
         dt = (prior[2] - pose[2] + math.pi) % (2.0 * math.pi) - math.pi
@@ -325,7 +234,7 @@ def _refine(
             width = max(sigma, 0.5 * width)
         elif small:
             break
-    total = _linearise(points, normals_rad, pose, window, tables, rules, sigma, H, b)
+    total = _linearise(points, normals_rad, laser, pose, window, tables, rules, sigma, H, b)
     diversity = _gate(H, b, rules.degenerate_below)
     for i in range(3):
         for j in range(3):
@@ -337,6 +246,7 @@ def _refine(
 def match(
     points: Array,
     normals_rad: Array,
+    laser: Array,
     prior: Array,
     prior_info: Pair,
     window: Any,
@@ -354,15 +264,17 @@ def match(
     """
     pose, H, covariance = out[0:3], out[3:12].reshape(3, 3), out[12:21].reshape(3, 3)
     pose[:] = prior
-    quality, diversity = _refine(points, normals_rad, pose, prior, prior_info, window, tables, rules, H)
+    quality, diversity = _refine(
+        points, normals_rad, laser, pose, prior, prior_info, window, tables, rules, H
+    )
     if quality < rules.climb_below or reach_rad > 0.0:
         rival = prior.copy()
         rival_H = np.empty((3, 3))
         if reach_rad > 0.0:
-            _sweep(points, rival, prior, prior_info, window, tables, rules, reach_rad, reach_m)
-        _climb(points, rival, prior, prior_info, window, tables, rules)
+            sweep(points, rival, prior, prior_info, window, tables, rules, reach_rad, reach_m)
+        climb(points, rival, prior, prior_info, window, tables, rules)
         rival_quality, rival_diversity = _refine(
-            points, normals_rad, rival, prior, prior_info, window, tables, rules, rival_H
+            points, normals_rad, laser, rival, prior, prior_info, window, tables, rules, rival_H
         )
         if rival_quality > quality:
             pose[:] = rival

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-NEIGHBOURS = 12  # beams to either side in which an arm is looked for
+NEIGHBOURS = 64  # beams to either side in which an arm is looked for: a wall a hand away needs so many
 LEAST_ARM_M, MOST_ARM_M = 0.1, 2.0
 MOST_ARM_RATIO = 3.0  # a jump in depth makes one arm far longer than the other
 MOST_OFF_M = 0.03  # from the line through its neighbours

@@ -85,7 +85,7 @@ def surface_normals(hits):
     normals = []
     for i, hit in enumerate(hits):
         arms = []
-        for side in (range(i - 1, max(i - 13, -1), -1), range(i + 1, min(i + 13, len(hits)))):
+        for side in (range(i - 1, max(i - 65, -1), -1), range(i + 1, min(i + 65, len(hits)))):
             arms += [hits[j] - hit for j in side if math.dist(hits[j], hit) >= 0.1][:1]
         normals.append(_across(*arms) if len(arms) == 2 else math.nan)
     return np.array(normals)
@@ -108,6 +108,8 @@ def normal_equations(beams, pose, window, normals, sigma_m, point_weight):
     occupied = [cell for cell, evidence in cells_of(window).items() if evidence > 0]
     H, b, total = np.zeros((3, 3)), np.zeros(3), 0.0
     c, s = math.cos(pose[2]), math.sin(pose[2])
+    laser = np.array([c * beams.laser_base[0], s * beams.laser_base[0]]) + pose[:2]
+    laser += np.array([-s * beams.laser_base[1], c * beams.laser_base[1]])
     for (px, py), seen_rad in zip(np.asarray(beams.hits, dtype=float), beams.normals_rad, strict=True):
         arm = np.array([c * px - s * py, s * px + c * py])
         point = arm + pose[:2]
@@ -118,7 +120,6 @@ def normal_equations(beams, pose, window, normals, sigma_m, point_weight):
         at = gy % n, gx % n
         error = (np.array([gx, gy]) + arrays.mean[at] / 65535.0) * size - point
         weight = math.exp(-0.5 * float(error @ error) / sigma_m**2)
-        total += weight
         code = int(arrays.normal[at])
         if code != 255:
             axes, strength = [normals[code].astype(float)], weight
@@ -128,11 +129,20 @@ def normal_equations(beams, pose, window, normals, sigma_m, point_weight):
             axes, strength = [np.array([math.cos(angle), math.sin(angle)])], weight
         else:
             axes, strength = [np.array([1.0, 0.0]), np.array([0.0, 1.0])], point_weight * weight
+        if len(axes) == 1 and _other_face(axes[0], arrays.whence[at] / 127.0, laser - point):
+            continue
+        total += weight
         for axis in axes:
             row = np.array([axis[0], axis[1], axis @ np.array([-arm[1], arm[0]])])
             H += strength * np.outer(row, row)
             b += strength * row * float(axis @ error)
     return H, b, total
+
+
+def _other_face(axis, whence, to_laser):
+    """Tell whether two looks at a surface are sure to come from its two sides."""
+    then, now = float(axis @ whence), float(axis @ to_laser) / math.hypot(*to_laser)
+    return then * now < 0.0 and min(abs(then), abs(now)) >= 0.1
 
 
 def _nearness(cell, here):

@@ -6,6 +6,7 @@ import pytest
 from lemtomap.grid import SlamConfig
 from lemtomap.grid.matching import Matcher
 from lemtomap.grid.matching import kernels as matching
+from lemtomap.grid.motion import Uncertainty
 from lemtomap.grid.scan import ScanPreparer
 from lemtomap.grid.window import Scratch, Window, look_up
 from lemtomap.types import Odometry
@@ -17,14 +18,14 @@ TABLES = look_up(CONFIG.resolution_m)
 ROOM = [*box(-1.53, -1.27, 1.61, 1.18), *box(0.4, 0.3, 0.7, 0.52)]
 
 
-def beams_at(pose, beams=60):
-    return ScanPreparer()(scan_at(pose, ROOM, beams=beams, range_max_m=2.0), Odometry(0.0, np.zeros(3)), 2.0)
+def beams_at(pose, beams=60, walls=ROOM):
+    return ScanPreparer()(scan_at(pose, walls, beams=beams, range_max_m=2.0), Odometry(0.0, np.zeros(3)), 2.0)
 
 
-def filled(beams=60):
+def filled(beams=60, walls=ROOM, poses=((0.0, 0.0, 0.1), (0.21, -0.13, 1.0), (-0.4, 0.33, -2.0))):
     window = Window(CONFIG, TABLES, Scratch(CONFIG.cells))
-    for pose in ((0.0, 0.0, 0.1), (0.21, -0.13, 1.0), (-0.4, 0.33, -2.0)):
-        window.integrate(beams_at(pose, beams), np.array(pose))
+    for pose in poses:
+        window.integrate(beams_at(pose, beams, walls), np.array(pose))
     return window
 
 
@@ -35,7 +36,16 @@ def test_the_normal_equations_are_the_twin_s(beams):
     rules = Matcher(CONFIG, TABLES)._rules
     H, b = np.empty((3, 3)), np.empty(3)
     total = matching._linearise(
-        seen.hits, seen.normals_rad, pose, window.arrays, TABLES, rules, CONFIG.match_sigma_m, H, b
+        seen.hits,
+        seen.normals_rad,
+        seen.laser_base,
+        pose,
+        window.arrays,
+        TABLES,
+        rules,
+        CONFIG.match_sigma_m,
+        H,
+        b,
     )
     wanted = naive.normal_equations(
         seen, pose, window, TABLES.normals, CONFIG.match_sigma_m, CONFIG.point_weight
@@ -56,3 +66,25 @@ def test_the_gate_weighs_only_the_weak_axis_and_does_so_bit_by_bit(across):
     assert matching._gate(H, b, 0.08) == pytest.approx(diversity)
     assert pytest.approx(H_wanted, abs=1e-9) == H
     assert pytest.approx(b_wanted, abs=1e-9) == b
+
+
+THIN = box(-1.5, -0.06, 1.5, 0.06)
+BELOW, ABOVE = (0.0, -0.8, math.pi / 2), (0.0, 0.8, -math.pi / 2)
+
+
+def test_a_wall_seen_only_from_behind_pulls_no_scan_of_its_front():
+    window, seen = filled(240, THIN, [BELOW]), beams_at(ABOVE, 240, THIN)
+    match = Matcher(CONFIG, TABLES)(seen, np.array(ABOVE), Uncertainty(0.05, 0.05), window)
+    assert match.T_grid_base == pytest.approx(ABOVE, abs=1e-6)
+    assert match.quality < 0.1
+    assert window.known_share(seen, np.array(ABOVE)) < 0.1
+
+
+def test_a_wall_s_own_face_is_matched_with_the_other_one_beside_it():
+    window, off = filled(240, THIN, [BELOW, ABOVE]), (0.0, 0.83, -math.pi / 2 + 0.03)
+    match = Matcher(CONFIG, TABLES)(
+        beams_at(ABOVE, 240, THIN), np.array(off), Uncertainty(0.05, 0.05), window
+    )
+    assert match.T_grid_base[1:] == pytest.approx(ABOVE[1:], abs=0.005)
+    assert match.diversity < 0.05
+    assert match.quality > 0.9

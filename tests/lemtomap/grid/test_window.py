@@ -5,8 +5,8 @@ import pytest
 
 from lemtomap import se2
 from lemtomap.grid import SlamConfig
-from lemtomap.grid.matching import kernels as matching
 from lemtomap.grid.scan import Beams, ScanPreparer
+from lemtomap.grid.searching import kernels as searching
 from lemtomap.grid.window import Scratch, Window, look_up
 from lemtomap.types import Odometry, Scan
 from tests.lemtomap.grid import naive
@@ -15,6 +15,7 @@ from tests.lemtomap.grid.rooms import box, scan_at
 CONFIG = SlamConfig(window_m=4.0, max_range_m=2.0)
 WALLS = [*box(-1.53, -1.27, 1.61, 1.18), *box(0.4, 0.3, 0.7, 0.52)]
 TABLES = look_up(CONFIG.resolution_m)
+ODOMETRY = Odometry(0.0, np.zeros(3))
 
 
 def beams_at(pose, walls=WALLS, count=90):
@@ -88,7 +89,7 @@ def test_score_is_the_twin_s_score():
     cells = naive.cells_of(window)
     beams = beams_at((0.1, 0.05, 0.2))
     for pose in [(0.1, 0.05, 0.2), (0.13, 0.0, 0.3), (-0.2, 0.3, 2.0)]:
-        mine = matching.score(beams.hits, 1, *pose, window.arrays, TABLES, CONFIG.resolution_m)
+        mine = searching.score(beams.hits, 1, *pose, window.arrays, TABLES, CONFIG.resolution_m)
         wanted = naive.closeness_score(beams.hits, pose, cells, 0.1, CONFIG.resolution_m)
         assert mine == pytest.approx(wanted, abs=2e-3)
 
@@ -165,3 +166,26 @@ def test_beams_that_saw_nothing_clear_only_the_usable_range():
     assert np.hypot(*beams.hits.T) == pytest.approx([1.0])
     assert np.hypot(*beams.cuts.T) == pytest.approx([2.0, 2.0])
     assert isinstance(beams, Beams)
+
+
+def test_both_faces_of_a_thin_wall_have_planes_of_their_own():
+    wall = box(-1.5, -0.06, 1.5, 0.06)
+    window = Window(CONFIG, TABLES, Scratch(CONFIG.cells))
+    for pose in [(0.0, -0.8, math.pi / 2), (0.0, 0.8, -math.pi / 2)] * 2:
+        window.integrate(beams_at(pose, wall, 240), np.array(pose))
+    n, arrays = window.cells, window.arrays
+    middle = [cell for cell, evidence in naive.cells_of(window).items() if evidence > 0 and abs(cell[0]) < 15]
+    assert len(middle) > 50
+    for gx, gy in middle:
+        at = gy % n, gx % n
+        assert TABLES.normals[arrays.normal[at]] == pytest.approx([0.0, 1.0], abs=0.02)
+        height_m = (gy + arrays.mean[at][1] / 65535.0 + arrays.lift[at] / 254.0) * CONFIG.resolution_m
+        assert abs(height_m) == pytest.approx(0.06, abs=1e-3)
+
+
+def test_a_wall_close_by_has_normals_although_its_hits_lie_close_together():
+    beams = ScanPreparer()(scan_at((0.0, 0.0, 0.0), box(-2.0, -0.3, 2.0, 2.0), beams=683), ODOMETRY, 5.6)
+    x, y = beams.hits.T
+    beside = (y < 0.0) & (x > -0.05) & (x < 0.15)  # further back the scan ends
+    assert beside.sum() > 80
+    assert beams.normals_rad[beside] == pytest.approx(math.pi / 2, abs=1e-3)
