@@ -22,6 +22,7 @@ from typing import Any
 from robot.build import build_core
 from robot.config import RobotConfig
 from robot.lockstep import run_lockstep
+from robot.warmup import warm_up
 from sim import worlds
 from sim.errors import BadWorld
 from sim.simulator import Simulator
@@ -48,6 +49,7 @@ def soak(options: SoakOptions, out: Path) -> None:
     map_path = out / "map.lemto"
     for old in out.glob("map.lemto*"):
         old.unlink()
+    warm_up(RobotConfig())  # as every run does: what is loaded once is no growth
     simulator = Simulator(worlds.load(options.world), seed=options.seed)
     core = build_core(RobotConfig(), map_path, durable=False, seed=options.seed)
     mission = ExploreThenGoals(options.explore_min * 60.0, options.seed)

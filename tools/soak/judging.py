@@ -109,6 +109,7 @@ class Verdict:
         lines += [
             f"wrong closure: edge {each['edge_id']}, {each['source_id']} to {each['target_id']}: "
             f"{each['off_m']:.2f} m and {np.rad2deg(each['off_rad']):.1f} degrees off"
+            f", {each['sigmas']:.1f} of its own sigmas"
             for each in self.wrong
         ]
         return "\n\n".join(lines)

@@ -56,6 +56,8 @@ class Closure:
     target_id: int
     off_m: float
     off_rad: float
+    sigmas: float
+    """How far off by the covariance of the edge: a closure along a corridor says how little it knows."""
 
 
 class Watcher:
@@ -126,7 +128,9 @@ class Watcher:
                 truth = between(self._born[edge.source_id], self._born[edge.target_id])
                 off = between(truth, edge.T_source_target)
                 way = float(np.hypot(off[0], off[1]))
-                found.append(Closure(edge.edge_id, edge.source_id, edge.target_id, way, float(off[2])))
+                sigmas = float(np.sqrt(off @ np.linalg.solve(edge.covariance, off)))
+                ends = edge.edge_id, edge.source_id, edge.target_id
+                found.append(Closure(*ends, way, float(off[2]), sigmas))
         return found
 
     def __enter__(self) -> Self:

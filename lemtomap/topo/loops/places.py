@@ -17,6 +17,7 @@ from lemtomap.topo.place import decode_place
 T = TypeVar("T")
 Points = NDArray[np.float64]
 RASTER_M = 0.1  # of joined places: as fine as they are stored
+COMPANIES_KEPT = 64  # some 30 kB each: more than one event searches
 DESCRIPTORS_KEPT = 8192  # a fifth of a kilobyte each
 
 
@@ -49,7 +50,7 @@ class PlaceBook:
 
     def company(self, node_id: int) -> Company | None:
         """Return a node's place joined with those around it; None when the node itself has none."""
-        return kept(self._companies, node_id, self._kept, self._join)
+        return kept(self._companies, node_id, COMPANIES_KEPT, self._join)
 
     def descriptor(self, node_id: int) -> NDArray[np.float32] | None:
         """Return what a node's place looks like, float32 (20,); None when it has no localisation data."""
