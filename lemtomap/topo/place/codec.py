@@ -7,6 +7,7 @@ front of that normal or from behind: a wall has two faces, and the other one sta
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ NORMAL_REACH_CELLS = 2
 SURE_SIDE = 0.2  # cosine of the mean look at a cell: glancing or from both sides, its front is not known
 HEADER_BYTES = 2
 MAX_RADIUS_M = 12.0
+DECODED_KEPT = 256  # boundaries, some 6 kB each: around the robot the same ones are asked for again
 SHRINK = 0.95  # each try at the byte budget keeps at most this much of the radius
 
 
@@ -59,8 +61,9 @@ def encode_place(
         radius_m = min(SHRINK, (byte_budget / len(code)) ** 0.7) * cells * CELL_M
 
 
+@lru_cache(DECODED_KEPT)
 def decode_place(blob: bytes) -> Boundary:
-    """Return the boundary of a code. Raises BadMap for a code of another format."""
+    """Return the boundary of a code, to be read only. Raises BadMap for a code of another format."""
     if len(blob) < HEADER_BYTES or blob[0] != FORMAT or blob[1] == 0:
         raise BadMap("localisation data of an unknown format")
     cells = blob[1]
