@@ -22,9 +22,7 @@ _DETOURS = np.array([detour(kind) for kind in sorted(EdgeType, key=type_code)]) 
 _MEASURE = np.dtype(
     {"names": ["x", "y"], "formats": ["<f8", "<f8"], "offsets": [0, 8], "itemsize": MEASURE.size}
 )
-CACHED_NODES = (
-    200_000  # some 500 bytes each: at most about 100 MB, reached only by planning across such a map
-)
+CACHED_NODES = 16_384  # some 500 bytes each, 8 MB: more than a map has that is planned over node by node
 
 
 class TopoReader:
