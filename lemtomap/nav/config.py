@@ -111,8 +111,8 @@ class ExploreConfig:
     """When an opening is worth a visit, and when exploration is over."""
 
     period_s: float = 0.5
-    least_size_m: float = 0.25  # a 0.8 m door leaves 0.4 m to the middle of a Kobuki
-    rest_size_m: float = 0.15  # ... and what is left of it is worth a look while it is larger than this
+    least_size_m: float = 0.35  # a 0.8 m door leaves 0.4 m to the middle of a Kobuki
+    rest_size_m: float = 0.30  # ... and what is left of it is worth a look while it is larger than this
     least_depth_m: float = 0.20  # dark seams less than twice this deep are gaps between beams
     goal_tolerance_m: float = 0.40
     switch_share: float = 0.5  # another opening must cost less than this share of the present one's

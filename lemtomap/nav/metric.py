@@ -24,6 +24,8 @@ class Reach:
     costs: Costs
     level: NDArray[np.uint8]
     """uint8 (rows, cols): 0 no, 1 over seen floor, 2 only over unseen floor."""
+    start: tuple[float, float]
+    """(row, col) as real numbers of the robot."""
 
     def area_m2(self) -> float:
         """Return how much floor can be reached."""
@@ -70,7 +72,8 @@ def reach_from(costs: Costs, p_grid: ArrayLike) -> Reach:
     """Flood the window from the robot's place."""
     row, col = costs.cell(p_grid)
     queue = np.empty(costs.state.size, dtype=np.int32)
-    return Reach(costs, kernels.flood(costs.cost, costs.state, int(np.floor(row)), int(np.floor(col)), queue))
+    level = kernels.flood(costs.cost, costs.state, int(np.floor(row)), int(np.floor(col)), queue)
+    return Reach(costs, level, (row, col))
 
 
 def plan_to(costs: Costs, p_robot_grid: ArrayLike, target_cell: tuple[int, int]) -> MetricPlan | None:

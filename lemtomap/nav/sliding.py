@@ -28,6 +28,8 @@ STEP_M = 0.25
 """Places on an edge are tried this far apart."""
 WORTH_M = 1.0
 """This much seen way along the next edge is better than a node over unseen floor."""
+HERE_M = 0.5
+"""A robot this near to a place is there: the velocity planner, which looks ahead, would stop short."""
 SAME_NODE_M, SAME_GOAL_M = 0.4, 1.5
 """How far a node strays in the window between two looks, and how far whoever explores moves a goal."""
 ROUND_SHARE, ROUND_M = 2.0, 3.0
@@ -104,7 +106,8 @@ def choose_target(
                     return target
             continue
         further = target if target.final else _along_edge(target, route, T_grid_node, reach)
-        if index > 0 or unproven is None or further.beyond_m > WORTH_M:
+        leads_on = (index > 0 or further.beyond_m > WORTH_M) and not _is_here(further, reach)
+        if unproven is None or leads_on:
             return further
     return unproven
 
@@ -117,6 +120,12 @@ def is_roundabout(route: Route, goal: Goal, target: Target, way_m: float) -> boo
     if not target.final or target.proven:
         return False
     return way_m > route.length_m + ROUND_SHARE * math.hypot(*goal.p_node) + ROUND_M
+
+
+def _is_here(target: Target, reach: Reach) -> bool:
+    """Tell whether the robot stands where a target is: then only unseen floor leads on."""
+    away = math.dist((target.cell[0] + 0.5, target.cell[1] + 0.5), reach.start)
+    return away * reach.costs.resolution_m <= HERE_M
 
 
 def _is_bound_for(target: Target, p_grid: tuple[float, float] | None, costs: Costs) -> bool:

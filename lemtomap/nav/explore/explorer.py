@@ -126,7 +126,7 @@ class Explorer:
         costs = costs.over_seen_floor(T_grid_base[:2])
         reach = reach_from(costs, T_grid_base)
         self._memory.take(costs, map_view.T_grid_node, T_grid_base, graph)
-        seen = self._memory.recall(costs, map_view.T_grid_node, graph)
+        seen = self._memory.recall(costs, graph)
         ground = Ground.of(reach, seen, config.least_depth_m)
         openings = find_openings(ground, config.rest_size_m)
         self._openings.match(openings, ground, map_view.T_grid_node, map_view.associated_id, now_s)

@@ -31,8 +31,8 @@ class Ground:
     def of(cls, reach: Reach, seen: NDArray[np.uint8], least_depth_m: float) -> Self:
         """Return the ground as a window shows it.
 
-        seen: uint8 (rows, cols), 1 where the ground is known or was known once; a patch of unseen ground
-        counts when a square of twice least_depth_m fits into it.
+        seen: uint8 (rows, cols), 1 where the ground is known or was known once; unseen ground counts
+        where it fills a square of twice least_depth_m.
         """
         depth = max(1, round(least_depth_m / reach.costs.resolution_m))
         return cls(reach, np.asarray(kernels.large_unknown(seen, depth)))

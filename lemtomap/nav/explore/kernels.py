@@ -12,42 +12,46 @@ FREE, UNKNOWN, LETHAL = 0, 1, 2  # as in lemtomap.nav.kernels
 
 @njit(nogil=True, cache=True)
 def large_unknown(seen: U1, depth: int) -> U1:
-    """Return 1 on 4-connected unseen patches that hold a square of 2 * depth + 1 unseen cells.
+    """Return 1 on the unseen ground that squares of 2 * depth + 1 unseen cells cover.
 
-    Thin dark seams (along walls, between beams, where a forgotten picture does not quite fit) are no patch.
+    Dark seams (along walls, between beams, behind a desk, where a forgotten picture does not quite fit) are
+    too thin for that. They do not count for leading to a patch either: each leads out of doors by some gap.
     """
     height, width = seen.shape
+    side = 2 * depth + 1
+    dark = _sums(1 - seen)
+    middles = np.zeros((height, width), dtype=np.uint8)
+    for r in range(height - side + 1):
+        for c in range(width - side + 1):
+            if _sum_of(dark, r, c, r + side, c + side) == side * side:
+                middles[r + depth, c + depth] = 1
+    total = _sums(middles)
+    large = np.zeros((height, width), dtype=np.uint8)
+    for r in range(height):
+        for c in range(width):
+            r0, c0 = max(0, r - depth), max(0, c - depth)
+            r1, c1 = min(height, r + depth + 1), min(width, c + depth + 1)
+            large[r, c] = _sum_of(total, r0, c0, r1, c1) > 0
+    return large
+
+
+@njit(nogil=True, cache=True)
+def _sums(marks: U1) -> I4:
+    """Return int32 (rows + 1, cols + 1): the sum over all cells above and left of each corner."""
+    height, width = marks.shape
     total = np.zeros((height + 1, width + 1), dtype=np.int32)
     for r in range(height):
         row = 0
         for c in range(width):
-            row += 1 - seen[r, c]
+            row += marks[r, c]
             total[r + 1, c + 1] = total[r, c + 1] + row
-    side = 2 * depth + 1
-    large = np.zeros((height, width), dtype=np.uint8)
-    queue = np.empty(height * width, dtype=np.int32)
-    tail = 0
-    for r in range(height - side + 1):
-        for c in range(width - side + 1):
-            dark = total[r + side, c + side] - total[r, c + side] - total[r + side, c] + total[r, c]
-            if dark == side * side:
-                large[r + depth, c + depth] = 1
-                queue[tail] = (r + depth) * width + c + depth
-                tail += 1
-    head = 0
-    while head < tail:
-        r, c = queue[head] // width, queue[head] % width
-        head += 1
-        for k in range(4):
-            rr = r + (1 if k == 0 else -1 if k == 1 else 0)
-            cc = c + (1 if k == 2 else -1 if k == 3 else 0)
-            if rr < 0 or cc < 0 or rr >= height or cc >= width:
-                continue
-            if seen[rr, cc] == 0 and large[rr, cc] == 0:
-                large[rr, cc] = 1
-                queue[tail] = rr * width + cc
-                tail += 1
-    return large
+    return total
+
+
+@njit(nogil=True, cache=True)
+def _sum_of(total: I4, r0: int, c0: int, r1: int, c1: int) -> int:
+    """Return the sum over the rows from r0 to before r1 and the columns from c0 to before c1."""
+    return int(total[r1, c1] - total[r0, c1] - total[r1, c0] + total[r0, c0])
 
 
 @njit(nogil=True, cache=True)

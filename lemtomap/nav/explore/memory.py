@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore import kernels
+from lemtomap.nav.explore.aside import Aside
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import GroundSeen
 from lemtomap.types import RouteGraph
@@ -50,6 +51,7 @@ class SeenMemory:
         """None: the map knows none."""
         self._untold: dict[int, None] = {}
         self._events: list[GroundSeen] = []
+        self._aside = Aside()
 
     def __len__(self) -> int:
         """Return how many nodes are in memory."""
@@ -63,6 +65,7 @@ class SeenMemory:
         graph: RouteGraph | None = None,
     ) -> None:
         """Add to the pictures of the nodes near the robot what the window shows now."""
+        self._aside.follow(T_grid_node)
         cell = CELL_M / costs.resolution_m
         left = dict(self._untold)
         for node_id, node in T_grid_node.items():
@@ -80,13 +83,14 @@ class SeenMemory:
         for node_id in left:
             self._tell(node_id)
 
-    def recall(
-        self, costs: Costs, T_grid_node: Mapping[int, Pose], graph: RouteGraph | None = None
-    ) -> NDArray[np.uint8]:
-        """Return uint8 (rows, cols): 1 where the ground is known or was seen from a node before."""
+    def recall(self, costs: Costs, graph: RouteGraph | None = None) -> NDArray[np.uint8]:
+        """Return uint8 (rows, cols): 1 where the ground is known or was seen from a node before.
+
+        Of nodes in the view taken last, and of those out of view that lie beside them.
+        """
         seen = (costs.state != kernels.UNKNOWN).astype(np.uint8)
         cell, stamp = CELL_M / costs.resolution_m, STAMP_M / costs.resolution_m
-        for node_id, node in T_grid_node.items():
+        for node_id, node in self._aside.places().items():
             if not costs.holds(node, -0.5 * SIDE * CELL_M):
                 continue
             picture = self._picture(node_id, graph)

@@ -110,14 +110,13 @@ def test_a_later_drive_does_not_explore_again_what_an_earlier_one_has_seen():
     world = office()
     world.graph = Keeping(world.graph.places, world.graph.links)
     explore(world, 400.0, 6.0)
-    way_m = []
+    took_s = []
     for graph in (world.graph, Graph(world.graph.places, world.graph.links)):
         later = office()
         later.graph, begun_s = graph, later.now_s
-        wish, _, _ = explore(later, 60.0, 6.0)
-        way_m.append(later.now_s - begun_s)
-        assert wish.done == (graph is world.graph), wish.text
-    assert way_m[0] < 20.0
+        explore(later, 60.0, 6.0)
+        took_s.append(later.now_s - begun_s)
+    assert took_s[0] < 0.5 * took_s[1], took_s
 
 
 def test_pictures_of_the_ground_far_from_the_robot_are_with_the_map():
@@ -136,5 +135,4 @@ def test_pictures_of_the_ground_far_from_the_robot_are_with_the_map():
     world.known[:] = False
     costmap.follow_window(world.view().grid)
     unknown = costmap.build(world.now_s, np.empty((0, 2)), world.pose[:2])
-    bare = SeenMemory().recall(unknown, {0: places[0]}).sum()
-    assert memory.recall(unknown, {0: places[0]}, graph).sum() > bare + 1000
+    assert memory.recall(unknown, graph).sum() > SeenMemory().recall(unknown).sum() + 1000

@@ -107,6 +107,16 @@ def test_keeps_the_way_over_unseen_floor_where_it_parts_from_the_edges():
     assert len(outputs) * 0.1 < 1.5 * (9.6 / 0.5), "drove to and fro between two ways"
 
 
+def test_goes_on_over_unseen_floor_from_where_the_seen_way_ends():
+    """The seen way ends beside the robot, before the goal's node, to which none of its own edges leads."""
+    world = two_rooms()
+    world.graph = Graph.of({1: (2.0, 1.5), 2: (3.0, 1.5), 3: (2.0, 1.85)}, [(1, 2), (2, 3)])
+    world.known[round(3.0 / RES) :] = False
+    world.pose = np.array([2.0, 1.5, 1.5])
+    outputs = run(world, Navigator(), Goal(3, (0.0, 3.0)), 30.0)
+    assert outputs[-1].state == NavState.ARRIVED
+
+
 def test_refuses_at_its_node_a_point_that_only_a_long_way_over_unseen_floor_might_lead_to():
     world = two_rooms()
     world.graph = Graph.of({1: (2.2, 3.4), 2: (2.2, 2.16), 3: (2.2, 1.0)}, [(1, 2), (2, 3)])

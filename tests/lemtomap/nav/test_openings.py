@@ -6,7 +6,7 @@ import pytest
 from lemtomap import se2
 from lemtomap.nav import kernels
 from lemtomap.nav.costmap import Costs
-from lemtomap.nav.explore.frontier import Opening
+from lemtomap.nav.explore.frontier import Opening, find_openings
 from lemtomap.nav.explore.ground import Ground
 from lemtomap.nav.explore.openings import Openings
 from lemtomap.nav.metric import reach_from
@@ -98,3 +98,11 @@ def test_a_failed_one_waits_and_a_closed_one_in_reach_gets_one_more_chance():
         assert openings.ready(end_s + 1.0) == []
         openings.match(again, ground([DARK_ROOM]), NODES, 1, end_s + 61.0)
         assert len(openings.ready(end_s + 61.0)) == expected
+
+
+@pytest.mark.parametrize(("wide_m", "count"), [(0.3, 0), (0.6, 1)])
+def test_no_dark_seam_is_one_for_leading_out_of_doors(wide_m, count):
+    low, high = 3.0 - 0.5 * wide_m, 3.0 + 0.5 * wide_m
+    seam, outside = (3.0, low, 4.5, high), (4.5, 0.0, 6.0, 6.0)
+    wall = [(4.2, 0.0, 4.5, low), (4.2, high, 4.5, 6.0)]
+    assert len(find_openings(ground([seam, outside], wall), 0.15)) == count

@@ -1,0 +1,71 @@
+"""What exploration remembers of ground that the window forgot."""
+
+import numpy as np
+
+from lemtomap import se2
+from lemtomap.nav import kernels
+from lemtomap.nav.costmap import Costs
+from lemtomap.nav.explore.aside import FOLLOWED_M, Aside
+from lemtomap.nav.explore.memory import SeenMemory
+
+RES, CELLS = 0.05, 200
+NODES = {k: se2.pose(1.0 + k, 5.0, 0.3 * k) for k in range(5)}
+
+
+def window(value: int) -> Costs:
+    """A window of 10 x 10 m, all free or all unknown."""
+    state = np.full((CELLS, CELLS), value, dtype=np.uint8)
+    return Costs(0.0, RES, (0.0, 0.0), state, np.full(state.shape, 9.0), np.ones(state.shape))
+
+
+def moved(nodes, by):
+    return {node_id: se2.compose(by, node) for node_id, node in nodes.items()}
+
+
+def test_knows_ground_again_whose_node_is_beyond_the_view():
+    memory = SeenMemory()
+    memory.take(window(kernels.FREE), NODES, NODES[0])
+    memory.take(window(kernels.UNKNOWN), {k: NODES[k] for k in (2, 3, 4)}, NODES[4])
+    memory.take(window(kernels.UNKNOWN), {4: NODES[4]}, NODES[4])
+    row, col = (int(v) for v in window(kernels.FREE).cell(NODES[0]))
+    assert memory.recall(window(kernels.UNKNOWN))[row, col] == 1
+
+
+def test_nodes_out_of_view_move_with_those_they_lie_beside():
+    aside, by = Aside(), se2.pose(3.0, -1.0, 0.7)
+    aside.follow(NODES)
+    aside.follow({k: NODES[k] for k in (2, 3, 4)})
+    aside.follow(moved({4: NODES[4]}, by))
+    expected = moved(NODES, by)
+    for node_id, place in aside.places().items():
+        np.testing.assert_allclose(place, expected[node_id], atol=1e-9)
+    assert set(aside.places()) == set(NODES)
+
+
+def test_a_node_in_view_again_is_where_the_view_has_it():
+    aside = Aside()
+    aside.follow(NODES)
+    aside.follow({4: NODES[4]})
+    again = {4: NODES[4], 0: se2.pose(9.0, 9.0, 0.0)}
+    aside.follow(again)
+    np.testing.assert_allclose(aside.places()[0], again[0])
+    aside.follow({4: NODES[4]})
+    np.testing.assert_allclose(aside.places()[0], again[0], atol=1e-9)
+
+
+def test_no_chain_is_followed_too_far_nor_into_another_part_of_the_map():
+    aside = Aside()
+    for k in range(round(FOLLOWED_M) + 10):
+        aside.follow({k: se2.pose(float(k), 0.0, 0.0), k + 1: se2.pose(k + 1.0, 0.0, 0.0)})
+    newest = max(aside.places())
+    assert min(aside.places()) == newest - 1 - round(FOLLOWED_M)
+    aside.follow({900: se2.pose(0.0, 0.0, 0.0)})
+    assert set(aside.places()) == {900}
+
+
+def test_only_the_nodes_that_left_the_view_last_are_followed():
+    aside = Aside(kept=6)
+    for k in range(30):
+        aside.follow({k: se2.pose(float(k), 0.0, 0.0), k + 1: se2.pose(k + 1.0, 0.0, 0.0)})
+        assert len(aside) <= 6
+    assert set(aside.places()) == set(range(23, 31))
