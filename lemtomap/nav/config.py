@@ -123,5 +123,6 @@ class ExploreConfig:
     slow_mps: float = 0.1  # ... at this speed; the navigator gives up much sooner, with a reason
     pause_s: float = 65.0  # an opening that failed is left alone until a closed edge is tried again
     attempts: int = 2
+    barred_attempts: int = 4  # ... when no open route led there: somebody stands in the only door
     linger_s: float = 1.5  # having arrived, the mapper gets this long to see
     sure_looks: int = 4  # looks without any opening before saying that all is explored

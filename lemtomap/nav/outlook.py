@@ -11,11 +11,12 @@ from typing import Protocol
 
 import numpy as np
 
+from lemtomap.nav.barriers import find_barrier
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.costmap import Costs
 from lemtomap.nav.metric import MetricPlan, Reach, plan_near, plan_to, reach_from
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.sliding import Target, choose_target, find_barrier, is_roundabout
+from lemtomap.nav.sliding import Target, choose_target, is_roundabout
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import CostmapView, Goal
 from lemtomap.nav.way import Moment

@@ -7,9 +7,10 @@ from collections.abc import Container
 import numpy as np
 
 from lemtomap.nav import kernels
+from lemtomap.nav.barriers import Barrier, cut_at
 from lemtomap.nav.config import RecoveryConfig
 from lemtomap.nav.metric import Reach
-from lemtomap.nav.sliding import SNAP_M, Barrier, cut_at
+from lemtomap.nav.sliding import SNAP_M
 from lemtomap.nav.types import Points
 from lemtomap.topo.events import EdgeTraversed
 from lemtomap.types import MapView, RouteGraph

@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lemtomap.nav.barriers import find_barrier, find_detour
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.metric import MetricPlan, Reach
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.planning import RoutePlanner
-from lemtomap.nav.sliding import BORDER_M, Target, find_barrier, find_detour
+from lemtomap.nav.sliding import BORDER_M, Target
 from lemtomap.nav.types import Goal
 from lemtomap.nav.watching import BarrierWatch, Link, links_cut, links_open_again
 from lemtomap.se2 import Pose

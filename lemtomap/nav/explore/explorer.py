@@ -16,7 +16,7 @@ from lemtomap.nav.explore.openings import Openings
 from lemtomap.nav.explore.prices import Here, Price, price_openings
 from lemtomap.nav.metric import Reach, reach_from
 from lemtomap.nav.route.fresh import FreshGraph
-from lemtomap.nav.types import Goal, NavOutput, NavState
+from lemtomap.nav.types import Goal, NavOutput, NavState, Reason
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent
 from lemtomap.topo.graph import OpeningState, Placeholder
@@ -143,7 +143,8 @@ class Explorer:
         if navigation is None or navigation.stamp_s <= pursuit.told_s:
             return
         if navigation.state == NavState.FAILED or now_s > pursuit.until_s:
-            self._give_up(pursuit.number, now_s)
+            barred = navigation.state == NavState.FAILED and navigation.reason == Reason.NO_ROUTE
+            self._give_up(pursuit.number, now_s, barred=barred)
             self._pursuit = None
         elif navigation.state == NavState.ARRIVED:
             pursuit.arrived_s = now_s if pursuit.arrived_s is None else pursuit.arrived_s
@@ -151,8 +152,10 @@ class Explorer:
                 self._openings.spend(pursuit.number)
                 self._pursuit = None
 
-    def _give_up(self, number: int, now_s: float) -> None:
-        self._openings.failed(number, now_s, pause_s=self.config.pause_s, attempts=self.config.attempts)
+    def _give_up(self, number: int, now_s: float, *, barred: bool = False) -> None:
+        """Leave an opening for later; one that no open route leads to cannot be blamed for that so soon."""
+        attempts = self.config.barred_attempts if barred else self.config.attempts
+        self._openings.failed(number, now_s, pause_s=self.config.pause_s, attempts=attempts)
 
     def _choose(self, here: Here) -> Goal | None:
         """Return a new goal if another opening is to be pursued, or the pursued one has moved."""

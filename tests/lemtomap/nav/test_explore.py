@@ -10,8 +10,10 @@ from lemtomap.nav.costmap import Costmap
 from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.explore.memory import SeenMemory
 from lemtomap.nav.navigator import Navigator
+from lemtomap.nav.types import NavOutput, NavState, Reason
 from lemtomap.topo.events import GroundSeen, OpeningDone, OpeningSeen
 from lemtomap.topo.graph import OpeningState, Placeholder
+from lemtomap.types import Twist
 from tests.lemtomap.nav.world import RES, Graph, World
 
 
@@ -136,3 +138,19 @@ def test_pictures_of_the_ground_far_from_the_robot_are_with_the_map():
     costmap.follow_window(world.view().grid)
     unknown = costmap.build(world.now_s, np.empty((0, 2)), world.pose[:2])
     assert memory.recall(unknown, graph).sum() > SeenMemory().recall(unknown).sum() + 1000
+
+
+@pytest.mark.parametrize(("reason", "tries"), [(Reason.BLOCKED, 2), (Reason.NO_ROUTE, 4)])
+def test_an_opening_to_which_every_route_is_closed_is_tried_more_often(reason, tries):
+    """Somebody in the only door bars the way to all of them at once."""
+    world, explorer, output, goals = office(), Explorer(), None, 0
+    world.reveal()
+    for _ in range(3000):
+        world.now_s += 0.5
+        wish = explorer.step(world.view(), world.graph, output, world.T_odom_base, world.now_s)
+        if wish.done:
+            break
+        goals += wish.goal is not None
+        output = NavOutput(world.now_s + 0.1, Twist(), NavState.FAILED, reason)
+    assert wish.done
+    assert goals == tries * len(wish.closed)
