@@ -1,4 +1,4 @@
-"""Flat loops of fitting places finely: nearest points, normals of walls, point-to-line alignment, tallies."""
+"""Flat loops of fitting places finely: nearest points, point-to-line alignment, tallies."""
 
 import numpy as np
 from numba import njit
