@@ -179,17 +179,20 @@ class Tracker(ABC):
         chance = leapt or way_m > config.search_m
         wanted = self._usual_quality * (1.0 if chance else self._known)
         if match.quality < config.collapse_share * wanted:
-            match = self._look_round(beams, match, predicted, leapt=leapt)
+            match = self._look_round(beams, match, predicted, config.collapse_share * wanted, leapt=leapt)
         elif match.accepted and way_m > config.match_distance_m:
             change = match.T_grid_base - predicted
             self._trust.learn(change, float(predicted[2]), match.information, expected)
-        share = config.quality_memory if self._usual_quality else 1.0
-        self._usual_quality += share * (match.quality - self._usual_quality)
+        if match.accepted or not self._usual_quality:
+            share = config.quality_memory if self._usual_quality else 1.0
+            self._usual_quality += share * (match.quality - self._usual_quality)
         return match
 
-    def _look_round(self, beams: Beams, match: Match, predicted: Pose, *, leapt: bool) -> Match:
-        """Return a clearly better match than one that fits badly: the wheels slipped, or odometry leapt and
-        the robot stayed.
+    def _look_round(
+        self, beams: Beams, match: Match, predicted: Pose, wanted: float, *, leapt: bool
+    ) -> Match:
+        """Return a clearly better match than one that fits badly, of at least the wanted quality: the wheels
+        slipped, or odometry leapt and the robot stayed.
         """
         assert self._T_grid_base is not None  # noqa: S101
         config = self.config
@@ -201,7 +204,7 @@ class Tracker(ABC):
         # a lone wall fits any other
         sharp = [rival for rival in rivals if rival.diversity >= config.degenerate_below]
         best = max(sharp, key=lambda rival: rival.quality, default=match)
-        return best if best.quality > match.quality + config.rival_gain else match
+        return best if best.quality > max(wanted, match.quality + config.rival_gain) else match
 
     def _step_covariance(self, T_grid_base: Pose) -> NDArray[np.float64]:
         """Return how far the motion since the previous report may be wrong.

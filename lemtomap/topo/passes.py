@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from lemtomap.se2 import Pose, between, transform
 from lemtomap.topo.graph import Covariance, sure_of
+from lemtomap.topo.lines import kernels as lines
 from lemtomap.topo.loops.cells import averaged, thinned
 from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.trail import Look
@@ -144,7 +145,7 @@ class _View:
     def __init__(self, hits: Points) -> None:
         hits = hits[np.abs(hits).max(axis=1) < VIEW_RADIUS_M]
         self._targets = averaged(hits, CELL_M)
-        self._normals = fitting.line_normals(self._targets, LINE_M)
+        self._normals = lines.line_normals(self._targets, LINE_M)
         self._low_m = -VIEW_RADIUS_M - REACH_M
         cells = round(-2.0 * self._low_m / FIELD_M)
         in_cells = (self._targets - self._low_m) / FIELD_M

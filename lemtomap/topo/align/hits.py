@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, transform
-from lemtomap.topo.align import kernels
+from lemtomap.topo.align.gathering import kernels
 from lemtomap.types import GridView
 
 CELL_M = 0.05

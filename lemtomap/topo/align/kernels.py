@@ -15,146 +15,6 @@ OTHER_FACE = -0.2  # cosine; a glancing look at a face that is not quite straigh
 
 
 @njit(nogil=True, cache=True)
-def add_hits(
-    points: Values,
-    from_x: float,
-    from_y: float,
-    cell: float,
-    owner: Indices,
-    taken: Cells,
-    sums: Values,
-    now: float,
-    recent: float,
-) -> None:
-    """Add grid-frame points seen from (from_x, from_y) to a ring of cells: owner (S, S, 2) is whose cell it
-    is, taken (S, S) 1 where it holds anything, sums (S, S, 6) x, y, n, when it was hit last in metres of way
-    like `now`, and the unit vectors to where it was seen from.
-
-    A cell that last belonged to another place of the building, or was hit too long ago, starts anew.
-    """
-    size = owner.shape[0]
-    for k in range(points.shape[0]):
-        x, y = points[k, 0], points[k, 1]
-        if not (math.isfinite(x) and math.isfinite(y)):
-            continue
-        col, row = math.floor(x / cell), math.floor(y / cell)
-        r, c = row % size, col % size
-        if owner[r, c, 0] != row or owner[r, c, 1] != col or now - sums[r, c, 3] > recent:
-            owner[r, c, 0], owner[r, c, 1] = row, col
-            taken[r, c] = 1
-            sums[r, c, :] = 0.0
-        if sums[r, c, 2] > 100.0:  # the mean goes on following a wall that moved
-            sums[r, c, :3] *= 0.5
-            sums[r, c, 4:] *= 0.5
-        sums[r, c, 0] += x
-        sums[r, c, 1] += y
-        sums[r, c, 2] += 1.0
-        sums[r, c, 3] = now
-        distance = max(math.hypot(from_x - x, from_y - y), 1e-6)
-        sums[r, c, 4] += (from_x - x) / distance
-        sums[r, c, 5] += (from_y - y) / distance
-
-
-@njit(nogil=True, cache=True)
-def collect_hits(
-    owner: Indices,
-    taken: Cells,
-    sums: Values,
-    cell: float,
-    centre_x: float,
-    centre_y: float,
-    radius: float,
-    least: float,
-    since: float,
-    occupancy: Cells,
-    resolution: float,
-    origin_x: float,
-    origin_y: float,
-    occupied_from: int,
-) -> Values:
-    """Return the mean hits in a square, newer than `since`, that the window believes, float64 (N, 4): x, y
-    and the mean unit vector to where it was seen from. The ring's side must be a multiple of 8.
-    """
-    size = owner.shape[0]
-    eights = taken.view(np.int64)
-    rows, cols = occupancy.shape
-    reach = min(math.ceil(radius / cell), size // 2 - 1)
-    row0, col0 = math.floor(centre_y / cell), math.floor(centre_x / cell)
-    low_row = max(row0 - reach, math.floor(origin_y / cell))  # what lies outside the window is not believed
-    high_row = min(row0 + reach, math.ceil((origin_y + rows * resolution) / cell))
-    low_col = max(col0 - reach, math.floor(origin_x / cell))
-    high_col = min(col0 + reach, math.ceil((origin_x + cols * resolution) / cell))
-    out = np.empty((max(0, high_row - low_row + 1) * max(0, high_col - low_col + 1), 4))
-    count = 0
-    for row in range(low_row, high_row + 1):
-        r = row % size
-        col, c = low_col - 1, low_col % size - 1
-        while col < high_col:
-            col, c = col + 1, c + 1
-            if c == size:
-                c = 0
-            if c & 7 == 0 and eights[r, c >> 3] == 0:  # most of 160,000 cells hold nothing
-                col, c = col + 7, c + 7
-                continue
-            if not taken[r, c] or owner[r, c, 0] != row or owner[r, c, 1] != col:
-                continue
-            if sums[r, c, 2] < least or sums[r, c, 3] < since:
-                continue
-            x, y = sums[r, c, 0] / sums[r, c, 2], sums[r, c, 1] / sums[r, c, 2]
-            i, j = math.floor((y - origin_y) / resolution), math.floor((x - origin_x) / resolution)
-            believed = False
-            for di in range(-1, 2):
-                for dj in range(-1, 2):
-                    if 0 <= i + di < rows and 0 <= j + dj < cols:
-                        believed |= occupancy[i + di, j + dj] >= occupied_from
-            if believed:
-                out[count, 0], out[count, 1] = x, y
-                out[count, 2] = sums[r, c, 4] / sums[r, c, 2]
-                out[count, 3] = sums[r, c, 5] / sums[r, c, 2]
-                count += 1
-    return out[:count].copy()
-
-
-@njit(nogil=True, cache=True)
-def boundary_cells(
-    occupancy: Cells,
-    resolution: float,
-    origin_x: float,
-    origin_y: float,
-    centre_x: float,
-    centre_y: float,
-    radius: float,
-    occupied_from: int,
-) -> Values:
-    """Return the occupied cells beside a free one within a square, float64 (N, 4), grid frame: middle, and
-    the direction of the free ones, from where such a cell was seen.
-    """
-    rows, cols = occupancy.shape
-    row0 = max(1, math.floor((centre_y - radius - origin_y) / resolution))
-    row1 = min(rows - 1, math.ceil((centre_y + radius - origin_y) / resolution))
-    col0 = max(1, math.floor((centre_x - radius - origin_x) / resolution))
-    col1 = min(cols - 1, math.ceil((centre_x + radius - origin_x) / resolution))
-    out = np.empty((max(0, row1 - row0) * max(0, col1 - col0), 4))
-    count = 0
-    for r in range(row0, row1):
-        for c in range(col0, col1):
-            if occupancy[r, c] < occupied_from:
-                continue
-            free, to_x, to_y = False, 0.0, 0.0
-            for dr, dc in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-                if 0 <= occupancy[r + dr, c + dc] < occupied_from // 2 + 1:
-                    free = True
-                    to_x, to_y = to_x + dc, to_y + dr
-            if free:
-                length = max(math.hypot(to_x, to_y), 1.0)
-                out[count, 2], out[count, 3] = to_x / length, to_y / length
-                out[count, 0] = origin_x + (c + 0.5) * resolution
-                out[count, 1] = origin_y + (r + 0.5) * resolution
-                count += 1
-    return out[:count].copy()
-
-
-@njit(nogil=True, cache=True)
 def nearest_field(
     targets: Values, low_x: float, low_y: float, cell: float, size: int, reach: float
 ) -> Indices:
@@ -193,6 +53,29 @@ def nearest_field(
 
 
 @njit(nogil=True, cache=True)
+def seen_cells(
+    occupancy: Cells,
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    low_x: float,
+    low_y: float,
+    cell: float,
+    size: int,
+) -> Cells:
+    """Return for each cell of a field, int8 (size, size), 1 where the window knows its middle."""
+    rows, cols = occupancy.shape
+    seen = np.zeros((size, size), np.int8)
+    for r in range(size):
+        i = math.floor((low_y + (r + 0.5) * cell - origin_y) / resolution)
+        for c in range(size):
+            j = math.floor((low_x + (c + 0.5) * cell - origin_x) / resolution)
+            if 0 <= i < rows and 0 <= j < cols and occupancy[i, j] >= 0:
+                seen[r, c] = 1
+    return seen
+
+
+@njit(nogil=True, cache=True)
 def same_face(nx: float, ny: float, targets: Values, t: int) -> bool:
     """Tell whether a boundary whose front looks along (nx, ny) can be what was hit there.
 
@@ -206,17 +89,22 @@ def same_face(nx: float, ny: float, targets: Values, t: int) -> bool:
 def fit(
     points: Singles,
     fronts: Singles,
+    normals: Singles,
     targets: Values,
     field: Indices,
+    seen: Cells,
     low_x: float,
     low_y: float,
     cell: float,
     pose: Values,
     sigma: float,
+    usual: float,
 ) -> float:
     """Return how well points fit at a pose, 0..1: mean of exp(-d^2 / 2 sigma^2) to the nearest targets.
 
-    fronts, float32 (N, 2): which way each point's face looks, (0, 0) where that is not known.
+    fronts, float32 (N, 2): which way each point's face looks, (0, 0) where that is not known. What falls
+    where the window has seen nothing, and past the end of what it has seen rather than behind it, counts as
+    `usual`: else the best pose would be the one that shifts the most of a wall back into sight.
     """
     size = field.shape[0]
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
@@ -225,14 +113,24 @@ def fit(
         x = pose[0] + cos * points[k, 0] - sin * points[k, 1]
         y = pose[1] + sin * points[k, 0] + cos * points[k, 1]
         c, r = math.floor((x - low_x) / cell), math.floor((y - low_y) / cell)
-        if 0 <= r < size and 0 <= c < size and field[r, c] >= 0:
-            t = field[r, c]
+        if not (0 <= r < size and 0 <= c < size):
+            total += usual
+            continue
+        t = field[r, c]
+        if t >= 0:
             fx = cos * fronts[k, 0] - sin * fronts[k, 1]
             fy = sin * fronts[k, 0] + cos * fronts[k, 1]
             if not same_face(fx, fy, targets, t):
                 continue
-            sq = (targets[t, 0] - x) ** 2 + (targets[t, 1] - y) ** 2
-            total += math.exp(-0.5 * sq / (sigma * sigma))
+            dx, dy = targets[t, 0] - x, targets[t, 1] - y
+            nx = cos * normals[k, 0] - sin * normals[k, 1]
+            ny = sin * normals[k, 0] + cos * normals[k, 1]
+            across, along = abs(nx * dx + ny * dy), abs(nx * dy - ny * dx)
+            if seen[r, c] or along <= max(across, 2.0 * cell):
+                total += math.exp(-0.5 * (dx * dx + dy * dy) / (sigma * sigma))
+                continue
+        if not seen[r, c]:
+            total += usual
     return float(total / max(1, points.shape[0]))
 
 
@@ -240,8 +138,10 @@ def fit(
 def search(
     points: Singles,
     fronts: Singles,
+    normals: Singles,
     targets: Values,
     field: Indices,
+    seen: Cells,
     low_x: float,
     low_y: float,
     cell: float,
@@ -251,6 +151,7 @@ def search(
     half_rad: float,
     step_rad: float,
     sigma: float,
+    usual: float,
     apart_m: float,
 ) -> Values:
     """Return the best pose of a regular search around a centre, its fit, and the best fit elsewhere.
@@ -269,7 +170,9 @@ def search(
             fits[i + shifts, j + shifts] = -1.0
             for t in range(-turns, turns + 1):
                 pose[2] = centre[2] + t * step_rad
-                value = fit(points, fronts, targets, field, low_x, low_y, cell, pose, sigma)
+                value = fit(
+                    points, fronts, normals, targets, field, seen, low_x, low_y, cell, pose, sigma, usual
+                )
                 fits[i + shifts, j + shifts] = max(fits[i + shifts, j + shifts], value)
                 if value > out[3]:
                     out[:3] = pose
@@ -289,17 +192,20 @@ def refine_system(
     normals: Singles,
     straightness: Singles,
     targets: Values,
+    lines: Values,
     field: Indices,
     low_x: float,
     low_y: float,
     cell: float,
     pose: Values,
     sigma: float,
+    reach: float,
 ) -> tuple[Values, Values, float, float]:
     """Return (H, g, sum of weights, weighted squared error) of one point-to-line Gauss-Newton step.
 
-    Axes: x and y of the grid frame and the yaw of the place about its own origin. Where the boundary has no
-    direction the point itself is matched. Cauchy weights at `sigma`.
+    Axes: x and y of the grid frame and the yaw of the place about its own origin. Where neither the boundary
+    nor the hits (lines, float64 (T, 3): normal of each target and how straight) have a direction the point
+    itself is matched. Cauchy weights at `sigma`; nothing is matched beyond `reach`.
     """
     size = field.shape[0]
     H, g = np.zeros((3, 3)), np.zeros(3)
@@ -318,6 +224,8 @@ def refine_system(
         if not same_face(fx, fy, targets, t):
             continue
         dx, dy = pose[0] + px - targets[t, 0], pose[1] + py - targets[t, 1]
+        if dx * dx + dy * dy > reach * reach:
+            continue
         nx, ny = (
             cos * normals[k, 0] - sin * normals[k, 1],
             sin * normals[k, 0] + cos * normals[k, 1],
@@ -326,7 +234,7 @@ def refine_system(
             strength = 1.0
             if axis == 1:
                 nx, ny = -ny, nx
-                strength = 1.0 - straightness[k]
+                strength = (1.0 - straightness[k]) * (1.0 - lines[t, 2])
                 if strength < 0.3:
                     continue
             e = nx * dx + ny * dy

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lemtomap.se2 import Pose, adjoint, between, wrap_angle
 from lemtomap.topo.align import kernels
 from lemtomap.topo.graph import Covariance
+from lemtomap.topo.lines import kernels as lines
 from lemtomap.topo.place import Boundary
 from lemtomap.types import GridView
 
@@ -29,7 +30,12 @@ class MatchConfig:
     gate_sigmas: float = 4.0  # from the prediction, Mahalanobis
     sigma_m: float = 0.05  # scatter of boundary points about hits: half a coding cell
     coarse_sigma_m: float = 0.15  # for the search: as wide as its step
-    weak_axis: float = 0.1  # a direction with less of the strongest one's information tells nothing
+    usual_fit: float = (
+        0.9  # of what is seen, in the search; unseen ground speaks neither for a pose nor against
+    )
+    bend_m: float = 0.006  # no match is surer, however many points: windows and places are a little bent
+    bend_rad: float = 0.007
+    weak_axis: float = 0.06  # a direction with less of the strongest one's information tells nothing
     points_per_look: float = 8.0  # neighbouring points err together; so many count as one
     apart_m: float = 0.35  # poses further apart than this are rivals in the search
     rival_share: float = 0.93  # a rival with this share of the best fit makes the search undecided
@@ -50,20 +56,36 @@ class Match:
     """Why the match is not believed; empty when it is."""
 
 
-FIELD_REACH_M = 0.4
+FIELD_REACH_M = 2.0  # twice the widest search: what lies that far in front of a point still hides it
+NEAR_REACH_M = 0.4  # a point further from all hits is matched to none
 FIELD_CELL_M = 0.05
+LINE_REACH_M = 0.2  # neighbourhood a wall's direction is taken from
 ITERATIONS = 15
 
 
 @dataclass(frozen=True, slots=True)
 class _Field:
     targets: NDArray[np.float64]
+    lines: NDArray[np.float64]
+    """Of the wall each target lies on, float64 (T, 3): normal, and how straight it is."""
     nearest: NDArray[np.int32]
+    seen: NDArray[np.int8]
+    """1 where the window has seen anything, cell by cell of the field."""
     low: tuple[float, float]
 
     @property
     def plan(self) -> tuple[NDArray[np.float64], NDArray[np.int32], float, float, float]:
         return self.targets, self.nearest, self.low[0], self.low[1], FIELD_CELL_M
+
+    @property
+    def surface(
+        self,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32], float, float, float]:
+        return self.targets, self.lines, self.nearest, self.low[0], self.low[1], FIELD_CELL_M
+
+    @property
+    def ground(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int8], float, float, float]:
+        return self.targets, self.nearest, self.seen, self.low[0], self.low[1], FIELD_CELL_M
 
 
 def match_place(
@@ -81,7 +103,7 @@ def match_place(
     start, covariance = predicted
     if len(boundary.points) < config.least_points or len(hits_grid) < config.least_points:
         return Match(start, covariance, 0.0, "too little to match")
-    field = _field(hits_grid, start, boundary.radius_m + 1.0)
+    field = _field(hits_grid, grid, start, boundary.radius_m + 1.0)
     coarse = _searched(boundary, field, start, covariance, config)
     T_grid_node, posterior = _refined(boundary, field, coarse, predicted, config)
     window = (grid.occupancy, grid.resolution_m, *grid.origin_m)
@@ -95,13 +117,15 @@ def match_place(
     return Match(T_grid_node, posterior, score)
 
 
-def _field(targets: NDArray[np.float64], centre: Pose, half_m: float) -> _Field:
+def _field(targets: NDArray[np.float64], grid: GridView, centre: Pose, half_m: float) -> _Field:
     faces = np.zeros((len(targets), 4))
     faces[:, : targets.shape[1]] = targets
     low = (float(centre[0] - half_m), float(centre[1] - half_m))
     size = round(2.0 * half_m / FIELD_CELL_M)
     nearest = kernels.nearest_field(faces, *low, FIELD_CELL_M, size, FIELD_REACH_M)
-    return _Field(faces, nearest, low)
+    window = (grid.occupancy, grid.resolution_m, *grid.origin_m)
+    seen = kernels.seen_cells(*window, *low, FIELD_CELL_M, size)
+    return _Field(faces, lines.line_normals(faces[:, :2], LINE_REACH_M), nearest, seen, low)
 
 
 def _searched(
@@ -118,7 +142,15 @@ def _searched(
         return start
     extent = (half_m, step_m, half_rad, step_rad)
     best = kernels.search(
-        boundary.points, boundary.fronts, *field.plan, start, *extent, config.coarse_sigma_m, config.apart_m
+        boundary.points,
+        boundary.fronts,
+        boundary.normals,
+        *field.ground,
+        start,
+        *extent,
+        config.coarse_sigma_m,
+        config.usual_fit,
+        config.apart_m,
     )
     ambiguous = best[4] > config.rival_share * best[3]
     return start if ambiguous else np.array(best[:3])
@@ -136,43 +168,51 @@ def _refined(
     turn = adjoint(np.array([0.0, 0.0, prior_pose[2]]))
     prior = np.linalg.inv(turn @ prior_covariance @ turn.T)
     pose = np.array(start, dtype=np.float64)
-    H = prior
+    stiff = np.diag([config.bend_m**-2.0, config.bend_m**-2.0, config.bend_rad**-2.0])
     for _ in range(ITERATIONS):
         seen, g, weight, error = kernels.refine_system(
             boundary.points,
             boundary.fronts,
             boundary.normals,
             boundary.straightness,
-            *field.plan,
+            *field.surface,
             pose=pose,
             sigma=config.sigma_m,
+            reach=NEAR_REACH_M,
         )
-        sees = _seen_axes(seen, config.weak_axis)
-        seen, g = sees @ seen @ sees, sees @ g
         scatter_sq = max(error / max(weight, 1.0), (0.4 * config.sigma_m) ** 2) * config.points_per_look
-        H = seen / scatter_sq + prior
+        unseen, sees = _axes(seen, config.weak_axis)
+        seen, g = sees.T @ seen @ sees / scatter_sq, sees.T @ g / scatter_sq
+        bent = sees.T @ stiff @ sees @ np.linalg.inv(seen + sees.T @ stiff @ sees)
         off = pose - prior_pose
         off[2] = wrap_angle(off[2])
-        step = np.linalg.solve(H, g / scatter_sq + prior @ off)
+        H = bent @ seen + sees.T @ prior @ sees
+        step = sees @ np.linalg.solve(H, bent @ g + sees.T @ prior @ (off - unseen @ (unseen.T @ off)))
+        step += unseen @ (unseen.T @ off)
         pose = pose - step
         if float(np.max(np.abs(step))) < 1e-5:
             break
     turn = adjoint(np.array([0.0, 0.0, -pose[2]]))
     pose[2] = wrap_angle(pose[2])
-    return pose, np.asarray(turn @ np.linalg.inv(H) @ turn.T)
+    follows = unseen - sees @ np.linalg.solve(H, sees.T @ prior @ unseen)
+    posterior = sees @ np.linalg.inv(H) @ sees.T
+    posterior += follows @ (unseen.T @ np.linalg.inv(prior) @ unseen) @ follows.T
+    return pose, np.asarray(turn @ posterior @ turn.T)
 
 
-def _seen_axes(information: Covariance, weak_axis: float) -> Covariance:
-    """Return the projection, float64 (3, 3), that leaves out the way along a corridor.
+def _axes(information: Covariance, weak_axis: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what the boundary does not tell, float64 (3, 0) or (3, 1): the way along a corridor; and the
+    rest of the axes.
 
     Walls are never quite straight, so a corridor seems to say a little about the way along it; it does not
-    (thesis, appendix D).
+    (thesis, appendix D). The prediction stands there untouched: it is so much less sure along than across
+    that else a centimetre across, with walls a degree askew, would slide the place decimetres along.
     """
     values, axes = np.linalg.eigh(information[:2, :2])
-    keep = np.eye(3)
-    if values[0] < weak_axis * values[1]:
-        keep[:2, :2] -= np.outer(axes[:, 0], axes[:, 0])
-    return keep
+    turned = np.eye(3)
+    turned[:2, :2] = axes
+    unseen = 1 if values[0] < weak_axis * values[1] else 0
+    return turned[:, :unseen], turned[:, unseen:]
 
 
 def _doubts(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, inverse, pose, transform, wrap_angle
 from lemtomap.topo.graph import sure_of
+from lemtomap.topo.lines import kernels as lines
 from lemtomap.topo.loops import kernels
 from lemtomap.topo.loops.config import MatchConfig
 from lemtomap.topo.loops.fitting import kernels as fitting
@@ -106,7 +107,7 @@ class Reference:
         """The normals of the hits' lines and the index of the hit nearest to each cell, made when needed."""
         if self._lines is None:
             config, grid = self.config, self.grid
-            normals = fitting.line_normals(self.points_grid, config.line_reach_m)
+            normals = lines.line_normals(self.points_grid, config.line_reach_m)
             in_cells = (self.points_grid - np.array(grid.origin_m)) / grid.resolution_m
             rows, cols = grid.occupancy.shape
             reach = config.nearest_m / grid.resolution_m

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,23 @@ def test_odometry_that_teleports_is_not_followed_where_the_scan_fits_the_old_pla
         update = slam.update(scan, Odometry(scan.stamp_s, T_odom_base))
         error = se2.between(truth, update.T_grid_base)
         assert np.hypot(error[0], error[1]) < 0.05
+
+
+def test_scans_that_fit_nowhere_do_not_lower_what_a_leap_must_reach():
+    """Blind for some metres round a corner, the robot took the first pose that fitted by a third."""
+    path = [(x, 0.0, 0.1) for x in np.arange(-2.0, 0.0, 0.04)]
+    slam = WindowMatcher(SlamConfig())
+    for truth, odometry, scan in drive(path, ROOM, odometry_noise=0.0):
+        slam.update(scan, odometry)
+        predicted = truth
+    usual, own = slam._usual_quality, slam._match
+    for poor in (0.1, 0.15, 0.2) * 20:
+
+        def fits_badly(*args, poor=poor):
+            rival = len(args) == 5 and args[4] > 1.0
+            quality = poor + 0.2 if rival else poor
+            return replace(own(*args), quality=quality, accepted=quality > 0.25)
+
+        slam._match = fits_badly
+        assert slam._track(slam._beams, predicted, 0.0).quality == poor
+    assert slam._usual_quality == usual

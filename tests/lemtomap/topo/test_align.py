@@ -129,3 +129,63 @@ def test_the_far_face_of_a_wall_is_not_taken_for_its_near_one(side, off_m):
     assert match.refused == ""
     assert abs(match.T_grid_node[0] - (0.05 if off_m else 0.0)) < 0.03
     assert abs(match.T_grid_node[1]) < 0.02
+
+
+def half_seen(hits, low, high):
+    """A window that knows nothing but what lies between two corners, float (2,), metres."""
+    window = window_of(hits)
+    rows, cols = np.indices(window.occupancy.shape)
+    x, y = cols * 0.05 - 10.0, rows * 0.05 - 10.0
+    inside = (x >= low[0]) & (y >= low[1]) & (x <= high[0]) & (y <= high[1])
+    window.occupancy[~inside & (window.occupancy == 0)] = -1
+    return window
+
+
+def test_a_wall_that_goes_on_out_of_sight_is_not_pulled_into_view():
+    """The window has seen the nearer part of the place's wall alone, nothing of the room at its end."""
+    x, y, shelf = np.arange(-4.5, 2.5, 0.02), np.arange(0.6, 3.0, 0.02), np.arange(-4.5, -2.0, 0.05)
+    thick = [np.c_[shelf, np.full_like(shelf, high)] for high in (0.65, 0.75)]
+    place = np.concatenate([np.c_[x, np.full_like(x, 0.55)], *thick, np.c_[np.full_like(y, -2.0), y]])
+    far = np.arange(-1.9, 8.0, 0.02)
+    hits = np.c_[far, np.full_like(far, 0.555)]
+    window = half_seen(hits, (-1.9, -1.0), (8.0, 0.6))
+    predicted = pose(0.1, 0.0, 0.0)
+    prior = np.diag([0.17**2, 0.01**2, 0.01**2])
+    match = match_place(at_node(place), hits, window, (predicted, prior), MatchConfig())
+    assert match.T_grid_node[0] == pytest.approx(0.1, abs=0.05)
+    assert match.covariance[0, 0] > 0.1**2
+
+
+@pytest.mark.parametrize("sigma_m", [0.2, 0.32])
+def test_a_wall_across_a_corridor_is_found_however_far_the_search_goes(sigma_m):
+    y = np.arange(-3.5, -0.6, 0.02)
+    x = np.arange(-4.9, 4.9, 0.02)
+    wall, far = np.c_[x, np.full_like(x, 1.8)], np.arange(2.0, 4.9, 0.02)
+    across = np.c_[np.full_like(y, 2.0), y]
+    place = np.concatenate([wall, across, np.c_[far, np.full_like(far, -0.6)]])
+    hits = np.concatenate([wall[x < 3.0], across])
+    window = half_seen(hits, (-6.0, -4.0), (2.05, 1.85))
+    predicted = pose(0.26, 0.0, 0.0)
+    prior = np.diag([sigma_m**2, 0.01**2, 0.01**2])
+    match = match_place(at_node(place), hits, window, (predicted, prior), MatchConfig())
+    assert match.refused == ""
+    assert abs(match.T_grid_node[0]) < 0.03
+
+
+def test_a_corridor_a_degree_askew_does_not_slide_the_place_along():
+    hits = transform(pose(0.0, 0.02, 0.015), corridor(8.0))
+    prior = np.diag([0.24**2, 0.007**2, 0.004**2])
+    predicted = pose(0.0, 0.0, 0.0)
+    match = match_place(at_node(corridor()), hits, window_of(hits), (predicted, prior), MatchConfig())
+    assert match.refused == ""
+    assert abs(match.T_grid_node[0]) < 0.01
+    assert match.covariance[0, 0] == pytest.approx(0.24**2, rel=0.1)
+    assert np.all(np.linalg.eigvalsh(match.covariance) > 0.0)
+
+
+def test_no_match_claims_to_be_surer_than_windows_are_straight():
+    hits = office(noise_m=0.0, seed=3)
+    match = match_place(at_node(office()), hits, window_of(hits), (pose(0, 0, 0), PRIOR), MatchConfig())
+    sigmas = np.sqrt(np.diag(match.covariance))
+    assert np.all(sigmas[:2] > 0.9 * MatchConfig().bend_m)
+    assert sigmas[2] > 0.9 * MatchConfig().bend_rad

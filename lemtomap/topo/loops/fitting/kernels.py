@@ -1,4 +1,4 @@
-"""Flat loops of fitting places finely: nearest points, normals of walls, point-to-line alignment, tallies."""
+"""Flat loops of fitting places finely: nearest points, point-to-line alignment, tallies."""
 
 import numpy as np
 from numba import njit
@@ -35,52 +35,6 @@ def nearest_index(
                     best[r, c] = gap
                     index[r, c] = i
     return index
-
-
-@njit(nogil=True, cache=True)
-def line_normals(
-    points_m: Values,
-    reach_m: float,
-) -> Values:
-    """Return float64 (N, 3): unit normal x, y of the line through each point's neighbourhood and how thin
-    that
-    neighbourhood is (1 a line, 0 round or alone).
-    """
-    n = points_m.shape[0]
-    order = np.argsort(points_m[:, 0])
-    result = np.zeros((n, 3))
-    reach2 = reach_m * reach_m
-    for k in range(n):
-        i = order[k]
-        x, y = points_m[i, 0], points_m[i, 1]
-        count, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for way in range(2):
-            step = 1 if way == 0 else -1
-            m = k if way == 0 else k - 1
-            while 0 <= m < n:
-                j = order[m]
-                dx, dy = points_m[j, 0] - x, points_m[j, 1] - y
-                if abs(dx) > reach_m:
-                    break
-                if dx * dx + dy * dy <= reach2:
-                    count += 1
-                    sx += dx
-                    sy += dy
-                    sxx += dx * dx
-                    sxy += dx * dy
-                    syy += dy * dy
-                m += step
-        if count < 3:
-            continue
-        mx, my = sx / count, sy / count
-        cxx, cxy, cyy = sxx / count - mx * mx, sxy / count - mx * my, syy / count - my * my
-        half, root = 0.5 * (cxx + cyy), np.sqrt(0.25 * (cxx - cyy) ** 2 + cxy * cxy)
-        large, small = half + root, half - root
-        angle = 0.5 * np.arctan2(2.0 * cxy, cxx - cyy)
-        result[i, 0] = -np.sin(angle)
-        result[i, 1] = np.cos(angle)
-        result[i, 2] = 1.0 - max(small, 0.0) / large if large > 1e-12 else 0.0
-    return result
 
 
 @njit(nogil=True, cache=True)

@@ -1,0 +1,1 @@
+"""Laser hits gathered in a ring of cells around the robot."""

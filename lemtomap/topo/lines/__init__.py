@@ -1,0 +1,1 @@
+"""Which way the surfaces run on which points lie."""
