@@ -16,6 +16,10 @@ SAME_M = 1.0
 """An opening this near to a known one is that one: it recedes while the robot comes nearer."""
 NEWS_M = 0.3
 """The map is told again when an opening moved by this much."""
+SHAMS = 3
+"""An opening that came and went so often at one place is none: what is remembered of the ground there is not
+seen from every side, and the robot would turn to and fro between it and where it wants to go."""
+GONE_KEPT = 1024
 
 
 @dataclass(slots=True)
@@ -23,6 +27,8 @@ class _Kept:
     placeholder: Placeholder
     told: Placeholder | None = None
     failures: int = 0
+    gone: int = 0
+    """How often an opening at this place was found explored before."""
     not_before_s: float = 0.0
     reopened: bool = False
 
@@ -33,6 +39,8 @@ class Openings:
     def __init__(self, least_size_m: float = 0.0) -> None:
         self._least_size_m = least_size_m
         self._kept: dict[int, _Kept] = {}
+        self._gone: dict[int, _Kept] = {}
+        """Explored ones, the last of each place."""
         self._next_id = 1
         self._events: list[NavEvent] = []
 
@@ -77,11 +85,7 @@ class Openings:
 
         here_id: the node the robot is at. A closed opening seen within reach later on is tried once more.
         """
-        places = {
-            number: se2.transform(T_grid_node[kept.placeholder.node_id], _point(kept.placeholder))
-            for number, kept in self._kept.items()
-            if kept.placeholder.node_id in T_grid_node
-        }
+        places, gone_places = _places(self._kept, T_grid_node), _places(self._gone, T_grid_node)
         free = dict(places)
         for opening in sorted(openings, key=lambda o: -o.size_m):
             number = _same(opening.p_grid, free, ground)
@@ -89,18 +93,26 @@ class Openings:
                 del free[number]
             elif _same(opening.p_grid, places, ground) is not None:
                 continue  # a second piece of an opening already matched
-            if number is None and opening.size_m < self._least_size_m:
-                continue  # enough to go on with, too little to begin with
+            gone = None if number is not None else _same(opening.p_grid, gone_places, ground)
+            if number is None and self._is_nothing(opening, gone):
+                continue
             known_from = here_id
             if number is not None:
                 self._reopen(self._kept[number], now_s)
                 known_from = self._kept[number].placeholder.node_id
             node_id = ground.node_in_sight(opening.p_grid, T_grid_node, known_from)
-            self._keep(number, opening, node_id, T_grid_node[node_id])
+            kept = self._keep(number, opening, node_id, T_grid_node[node_id])
+            if gone is not None:
+                del gone_places[gone]
+                kept.gone = self._gone.pop(gone).gone
         for number, place in free.items():
             kept = self._kept[number]
             if kept.placeholder.state == OpeningState.OPEN and not ground.still_open(place):
                 self.done(number, closed=False)
+
+    def _is_nothing(self, opening: Opening, gone: int | None) -> bool:
+        """Tell whether an opening is enough to go on with but too little to begin with, or a sham."""
+        return opening.size_m < self._least_size_m or (gone is not None and self._gone[gone].gone >= SHAMS)
 
     def _reopen(self, kept: _Kept, now_s: float) -> None:
         closed = kept.placeholder.state == OpeningState.CLOSED
@@ -108,7 +120,7 @@ class Openings:
             kept.placeholder = replace(kept.placeholder, state=OpeningState.OPEN)
             kept.reopened, kept.told = True, None
 
-    def _keep(self, number: int | None, opening: Opening, node_id: int, T_grid_node: Pose) -> None:
+    def _keep(self, number: int | None, opening: Opening, node_id: int, T_grid_node: Pose) -> _Kept:
         """Attach an opening to a node, under its old number or a new one."""
         state = OpeningState.OPEN if number is None else self._kept[number].placeholder.state
         if number is None:
@@ -122,6 +134,7 @@ class Openings:
         if moved:
             kept.told = placeholder
             self._events.append(OpeningSeen(number, node_id, float(x), float(y), float(yaw), opening.size_m))
+        return kept
 
     def failed(self, number: int, now_s: float, *, pause_s: float, attempts: int) -> None:
         """An opening could not be reached: leave it for a while, or for good."""
@@ -150,6 +163,19 @@ class Openings:
             kept.placeholder = replace(kept.placeholder, state=OpeningState.CLOSED)
         else:
             del self._kept[number]
+            kept.gone += 1
+            self._gone[number] = kept
+            if len(self._gone) > GONE_KEPT:
+                del self._gone[next(iter(self._gone))]
+
+
+def _places(kept: Mapping[int, _Kept], T_grid_node: Mapping[int, Pose]) -> dict[int, Pose]:
+    """Return where in the window those openings lie whose nodes are in view."""
+    return {
+        number: se2.transform(T_grid_node[each.placeholder.node_id], _point(each.placeholder))
+        for number, each in kept.items()
+        if each.placeholder.node_id in T_grid_node
+    }
 
 
 def _point(placeholder: Placeholder) -> tuple[float, float]:

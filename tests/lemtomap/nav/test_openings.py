@@ -106,3 +106,16 @@ def test_no_dark_seam_is_one_for_leading_out_of_doors(wide_m, count):
     seam, outside = (3.0, low, 4.5, high), (4.5, 0.0, 6.0, 6.0)
     wall = [(4.2, 0.0, 4.5, low), (4.2, high, 4.5, 6.0)]
     assert len(find_openings(ground([seam, outside], wall), 0.15)) == count
+
+
+def test_an_opening_that_comes_and_goes_is_left_alone_at_last():
+    """What is known of the ground depends on the nodes in view; turning to and fro would never end."""
+    openings, numbers = Openings(), set()
+    for look in range(20):
+        openings.match([Opening(EDGE, 0.0, 1.0)], ground([DARK_ROOM]), NODES, 1, 2.0 * look)
+        numbers |= {each.placeholder_id for each in openings.of_state(OpeningState.OPEN)}
+        openings.match([], ground(), NODES, 1, 2.0 * look + 1.0)
+    assert len(numbers) == 3
+    elsewhere = Opening((3.95, 5.2), 0.0, 1.0)
+    openings.match([elsewhere], ground([DARK_ROOM]), NODES, 1, 50.0)
+    assert len(openings.of_state(OpeningState.OPEN)) == 1
