@@ -82,7 +82,9 @@ class RecoveryConfig:
     back_off_s: float = 5.0
     back_off_mps: float = 0.10
     barred_patience_s: float = 20.0  # with no other way, what stands in the only one is given this long
-    block_s: float = 60.0  # a closed edge is tried again after this
+    block_s: float = 60.0  # a closed edge is tried again after this, ...
+    block_growth: float = 4.0  # ... after so many times as long when it is closed once more, ...
+    block_longest_s: float = 1800.0  # ... but not after longer than this
     lost_patience_s: float = 20.0
     attempts: int = 2  # times through the ladder before giving up ...
     forgive_m: float = 3.0  # ... unless this much way was made good in between

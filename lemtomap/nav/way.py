@@ -18,6 +18,7 @@ from lemtomap.topo.events import EdgeBlocked, NavEvent
 from lemtomap.types import MapView, RouteGraph, Twist
 
 NEAR_BARRIER_M = 1.0
+SEEN_FREE_TIMES = 2
 SHUT_IN_M2 = 1.0
 """A robot that can reach less floor than this is held by a chair or by noise, not by a closed door."""
 
@@ -43,6 +44,8 @@ class WayKeeper:
         self._planner = RoutePlanner(config.route)
         self._version: int | None = None
         self._closed_s: dict[int, float] = {}
+        self._closings: dict[int, tuple[int, float]] = {}
+        """How often an edge was closed of late, and when last."""
         self.route: Route | None = None
         """None: to be planned anew."""
         self.barred_s: float | None = None
@@ -91,8 +94,12 @@ class WayKeeper:
         return barrier.p_middle_grid
 
     def reopen(self, reach: Reach, moment: Moment) -> bool:
-        """Open closed edges that are seen to be free; tell whether there were any."""
-        links = links_open_again(self._closed_s, moment.map_view, reach)
+        """Open closed edges that are seen to be free; tell whether there were any.
+
+        One that proved closed again and again, though it had been seen free, waits for its time.
+        """
+        believed = [e for e in self._closed_s if self._closings.get(e, (0, 0.0))[0] <= SEEN_FREE_TIMES]
+        links = links_open_again(believed, moment.map_view, reach)
         for edge_id, a, b in links:
             del self._closed_s[edge_id]
             moment.events.append(EdgeBlocked(a, b, 0.0))
@@ -109,10 +116,20 @@ class WayKeeper:
 
     def _close(self, links: Sequence[Link], moment: Moment) -> None:
         """Plan around these edges from now on, and tell the map."""
-        until_s = moment.now_s + self._config.recovery.block_s
         for edge_id, a, b in {link[0]: link for link in links}.values():
-            self._closed_s[edge_id] = until_s
+            until_s = self._closed_s[edge_id] = moment.now_s + self._block_s(edge_id, moment.now_s)
             moment.events.append(EdgeBlocked(a, b, until_s))
         self.barred_s = moment.now_s
         self.route = None
         self.barriers.reset()
+
+    def _block_s(self, edge_id: int, now_s: float) -> float:
+        """Return how long an edge is to be closed: each time longer, else two closed ways that open again
+        while the robot is at the other one send it to and fro for ever.
+        """
+        recovery = self._config.recovery
+        longest_s = recovery.block_longest_s
+        self._closings = {e: c for e, c in self._closings.items() if now_s - c[1] < longest_s}
+        before, _ = self._closings.get(edge_id, (0, now_s))
+        self._closings[edge_id] = (before + 1, now_s)
+        return min(recovery.block_s * recovery.block_growth**before, longest_s)

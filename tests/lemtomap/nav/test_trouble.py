@@ -1,8 +1,11 @@
 """What the navigator does when the world changes or does not let it pass."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from lemtomap.nav.config import NavConfig, RecoveryConfig
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import NavState, Reason, Sighting
 from lemtomap.topo.events import Bumped, EdgeBlocked
@@ -41,6 +44,24 @@ def test_uses_a_door_again_that_opens():
     outputs = run(world, navigator, 6, 60.0)
     assert outputs[-1].state == NavState.ARRIVED
     assert len(outputs) * 0.1 < 15.0, "took the long way though the door stood open in plain sight"
+
+
+def test_two_ways_that_are_shut_by_turns_do_not_send_it_to_and_fro_for_ever():
+    """Each is seen to be shut only from near by, and counts as open again while the robot is at the other."""
+    world = two_rooms()
+    navigator = Navigator(
+        replace(NavConfig(), recovery=replace(RecoveryConfig(), block_s=8.0, barred_patience_s=2.0))
+    )
+
+    def doors(w):
+        for x0, x1 in ((6.55, 7.45), (1.75, 2.65)):
+            near = abs(w.pose[0] - 0.5 * (x0 + x1)) < 2.0
+            w.box(x0, 2.0, x1, 2.15, value=near)
+
+    outputs = run(world, navigator, 9, 400.0, doors)
+    assert outputs[-1].state == NavState.FAILED
+    assert "closed" in outputs[-1].text
+    assert world.contacts == 0
 
 
 def test_refuses_with_the_reason_when_no_way_is_left():
