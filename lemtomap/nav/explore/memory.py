@@ -5,6 +5,7 @@ one bit for each quarter metre, 288 bytes a node. Those around the robot are in 
 each when the robot leaves its node, and asked when the robot comes back, in this run or in a later one.
 """
 
+import math
 import zlib
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore import kernels
@@ -90,7 +92,7 @@ class SeenMemory:
         """
         seen = (costs.state != kernels.UNKNOWN).astype(np.uint8)
         cell, stamp = CELL_M / costs.resolution_m, STAMP_M / costs.resolution_m
-        for node_id, node in self._aside.places().items():
+        for node_id, (node, off_m) in self._aside.places().items():
             if not costs.holds(node, -0.5 * SIDE * CELL_M):
                 continue
             picture = self._picture(node_id, graph)
@@ -98,6 +100,8 @@ class SeenMemory:
                 continue
             row, col = costs.cell(node)
             bits = np.unpackbits(picture).reshape(SIDE, SIDE)
+            if off_m > 0.0:
+                bits = _sure(bits, math.ceil(off_m / CELL_M))
             kernels.recall(seen, row, col, float(node[2]), cell, bits, stamp)
         return np.asarray(seen)
 
@@ -128,3 +132,8 @@ class SeenMemory:
                 self._tell(oldest_id)
             del self._pictures[oldest_id]
         return picture
+
+
+def _sure(bits: NDArray[np.uint8], cells: int) -> NDArray[np.uint8]:
+    """Return the ground that was seen even if the picture is so many cells off its place."""
+    return ndimage.minimum_filter(bits, size=2 * cells + 1, mode="constant", cval=0)

@@ -1,5 +1,7 @@
 """What exploration remembers of ground that the window forgot."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from lemtomap import se2
@@ -37,7 +39,7 @@ def test_nodes_out_of_view_move_with_those_they_lie_beside():
     aside.follow({k: NODES[k] for k in (2, 3, 4)})
     aside.follow(moved({4: NODES[4]}, by))
     expected = moved(NODES, by)
-    for node_id, place in aside.places().items():
+    for node_id, (place, _) in aside.places().items():
         np.testing.assert_allclose(place, expected[node_id], atol=1e-9)
     assert set(aside.places()) == set(NODES)
 
@@ -48,9 +50,9 @@ def test_a_node_in_view_again_is_where_the_view_has_it():
     aside.follow({4: NODES[4]})
     again = {4: NODES[4], 0: se2.pose(9.0, 9.0, 0.0)}
     aside.follow(again)
-    np.testing.assert_allclose(aside.places()[0], again[0])
+    np.testing.assert_allclose(aside.places()[0][0], again[0])
     aside.follow({4: NODES[4]})
-    np.testing.assert_allclose(aside.places()[0], again[0], atol=1e-9)
+    np.testing.assert_allclose(aside.places()[0][0], again[0], atol=1e-9)
 
 
 def test_no_chain_is_followed_too_far_nor_into_another_part_of_the_map():
@@ -69,3 +71,22 @@ def test_only_the_nodes_that_left_the_view_last_are_followed():
         aside.follow({k: se2.pose(float(k), 0.0, 0.0), k + 1: se2.pose(k + 1.0, 0.0, 0.0)})
         assert len(aside) <= 6
     assert set(aside.places()) == set(range(23, 31))
+
+
+def test_ground_at_the_end_of_a_long_chain_is_known_only_where_its_error_leaves_no_doubt():
+    """Else the floor on one side of a thin wall would be taken for that on the other."""
+    state = np.full((CELLS, CELLS), kernels.FREE, dtype=np.uint8)
+    state[: round(4.0 / RES)] = kernels.UNKNOWN
+    half = replace(window(kernels.FREE), state=state)
+    memory, dark = SeenMemory(), window(kernels.UNKNOWN)
+    memory.take(half, {1: NODES[0], 2: NODES[1]}, NODES[0])
+    in_view = memory.recall(dark)
+    memory.take(dark, {2: NODES[1]}, se2.pose(90.0, 0.0, 0.0))
+    aside = memory.recall(dark)
+    assert 0 < aside.sum() < in_view.sum()
+    assert np.flatnonzero(in_view.any(axis=1))[0] * RES <= 4.0
+    only = SeenMemory()
+    only.take(half, {1: NODES[0], 2: NODES[1]}, NODES[0])
+    only._pictures[2] = None
+    only.take(dark, {2: NODES[1]}, se2.pose(90.0, 0.0, 0.0))
+    assert np.flatnonzero(only.recall(dark).any(axis=1))[0] * RES > 4.1
