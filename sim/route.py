@@ -16,6 +16,7 @@ CELL_M = 0.10  # planning step; finer rasters are thinned
 KEEP_OFF_M = 0.27  # body radius 0.178 m and 9 cm to spare
 LIKE_OFF_M = 0.60  # nearer than this costs more, so that tours keep to the middle
 ROOF_REACH_M = 25.0
+FIRST_LIMIT, MOST_COST = 2.0, 2000.0  # the search ends at twice the straight line, then goes on further
 
 
 class RoutePlanner:
@@ -57,17 +58,30 @@ class RoutePlanner:
             raise BadWorld(f"tour: nothing passable within 1 m of ({point[0]:g}, {point[1]:g})")
         return best
 
-    def distances(self, start: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return cost to every passable cell (inf unreachable) and its predecessor, by cell number."""
+    def distances(
+        self, start: tuple[float, float], limit: float = np.inf
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return cost to every passable cell and its predecessor, by cell number.
+
+        inf: unreachable, or beyond the limit.
+        """
         found = csgraph.dijkstra(
-            self._graph, directed=False, indices=np.array([self._nearest(start)]), return_predecessors=True
+            self._graph,
+            directed=False,
+            indices=np.array([self._nearest(start)]),
+            return_predecessors=True,
+            limit=limit,
         )
         return np.asarray(found[0])[0], np.asarray(found[1])[0].astype(np.int64)
 
     def path(self, start: tuple[float, float], goal: tuple[float, float]) -> NDArray[np.float64]:
         """Return points, float64 (N, 2) metres, about a cell apart. Raises BadWorld when there is no way."""
-        cost, before = self.distances(start)
         cell = self._nearest(goal)
+        limit = FIRST_LIMIT * max(1.0, np.hypot(start[0] - goal[0], start[1] - goal[1]))
+        cost, before = self.distances(start, limit)
+        while not np.isfinite(cost[cell]) and limit < MOST_COST:  # a near goal pays for no large building
+            limit *= FIRST_LIMIT
+            cost, before = self.distances(start, limit if limit < MOST_COST else np.inf)
         if not np.isfinite(cost[cell]):
             raise BadWorld(f"tour: no way from {start} to {goal}")
         cells = [cell]

@@ -24,12 +24,13 @@ from lemtomap.types import MapView
 from robot.exchange import Exchange
 from robot.mapping import MappingStep
 from sim.world import World
+from tools.revisits import OLD_M, Revisits
 from tools.sim_robot import Seen
 
 WRONG_M, WRONG_RAD = 0.5, math.radians(10.0)  # a closure beyond either joins the wrong places
 BINS = 20
 CHECK_EVERY_M = 0.5
-NEAR_M, AGO_M, APART_M, CLOSED_WITHIN_M = 1.0, 30.0, 8.0, 5.0
+NEAR_M, APART_M = 1.0, 8.0  # a node beside the robot; how far along the edges the map may believe it
 
 
 @dataclass
@@ -45,8 +46,11 @@ class Score:
     wrong: int = 0
     worst_m: float = 0.0
     closed: int = 0
-    """Revisits that the graph knew of within CLOSED_WITHIN_M of travel."""
+    """Revisits that the graph knew of soon enough, ..."""
     missed: int = 0
+    """... those that it did not, ..."""
+    brief: int = 0
+    """... and those left again before either (`tools.revisits`)."""
     cpu_s: float = 0.0
     poses: list[int] = field(default_factory=lambda: [0] * BINS)
     """Poses by their quality, ..."""
@@ -72,7 +76,7 @@ class JudgedMap:
         self._at_birth_m: dict[int, float] = dict.fromkeys(self.born, -math.inf)
         self._before: Pose | None = None
         self._checked_m = 0.0
-        self._apart_since_m: float | None = None
+        self._revisits = Revisits()
 
     @property
     def view(self) -> MapView:
@@ -124,25 +128,18 @@ class JudgedMap:
         self.score.right[at] += off_m <= RIGHT_M and off_rad <= RIGHT_RAD
 
     def _judge_revisit(self, T_world_base: Pose) -> None:
-        """Follow how long the robot has been among old nodes that the graph believes far away."""
-        score = self.score
-        ids = [i for i, at_m in self._at_birth_m.items() if score.path_m - at_m >= AGO_M]
-        if not ids:
-            return
+        """Tell what ground this truly is, and whether the graph knows."""
+        ids = list(self._at_birth_m)
         places = np.array([self.born[i][:2] for i in ids])
-        gap_m = np.hypot(*(places - T_world_base[:2]).T)
-        near = [ids[k] for k in np.flatnonzero(gap_m <= NEAR_M) if self._in_sight(T_world_base, places[k])]
+        near = np.flatnonzero(np.hypot(*(places - T_world_base[:2]).T) <= NEAR_M)
+        seen = [ids[k] for k in near if self._in_sight(T_world_base, places[k])]
+        way_m = self.score.path_m
+        ages_m = {i: way_m - self._at_birth_m[i] for i in seen}
         known = self.mapper.graph.reach(self.view.associated_id, APART_M)
-        if near and not any(node_id in known for node_id in near):
-            if self._apart_since_m is None:
-                self._apart_since_m = score.path_m
-            elif score.path_m - self._apart_since_m > CLOSED_WITHIN_M and not math.isinf(self._apart_since_m):
-                score.missed += 1
-                self._apart_since_m = math.inf
-        else:
-            if near and self._apart_since_m is not None and not math.isinf(self._apart_since_m):
-                score.closed += 1
-            self._apart_since_m = None
+        old = [i for i, age_m in ages_m.items() if age_m >= OLD_M]
+        self._revisits.look(
+            way_m, max(ages_m.values(), default=None), known=any(node_id in known for node_id in old)
+        )
 
     def _in_sight(self, a: Pose, b: NDArray[np.float64]) -> bool:
         raster = self._world.raster
@@ -158,6 +155,8 @@ class JudgedMap:
             off_m = float(np.hypot(off[0], off[1]))
             self.score.worst_m = max(self.score.worst_m, off_m)
             self.score.wrong += off_m > WRONG_M or abs(float(off[2])) > WRONG_RAD
+        self.score.closed, self.score.missed = self._revisits.closed, self._revisits.missed
+        self.score.brief = self._revisits.brief
         self.score.closures = len(self.recogniser.closures)
         self.score.pruned = len(self.pruned)
         self.score.nodes = self.mapper.store.count("node")
