@@ -32,7 +32,7 @@ from tools.mapping_runs import table
 from tools.sim_buildings import building, next_day
 from tools.sim_maps import BINS, JudgedMap, still_true
 from tools.sim_robot import SimRobot
-from tools.sim_trials import LIMIT_M, LIMIT_S, Found, Trial
+from tools.sim_trials import ENDS, LIMIT_M, LIMIT_S, Found, Trial
 
 CLOSURE_WORLDS = {"office@3": 600.0, "loop": 420.0, "alike:16": 420.0, "offices:24": 600.0}  # seconds of tour
 WILLOW_S, WILLOW_LARGE_S = 600.0, 1200.0
@@ -88,7 +88,8 @@ def closures(options: argparse.Namespace) -> None:
 def _mapped(name: str, seed: int, seconds: float, case: Path) -> Found:
     world = building(_seeded(name, seed))
     robot, path = SimRobot(world, seed), case.with_suffix(".lemto")
-    path.unlink(missing_ok=True)
+    for end in ENDS:
+        path.with_suffix(end).unlink(missing_ok=True)
     judged = JudgedMap(path, world)
     judged.feed(robot.stand(1.0))
     judged.feed(robot.drive(plan_tour(world, seconds, seed=seed)))
@@ -103,7 +104,8 @@ def _seeded(name: str, seed: int) -> str:
 def _brief(found: Found) -> str:
     return (
         f"{found['closures']} closures, {found['wrong']} wrong, {found['closed']} revisits closed, "
-        f"{found['missed']} missed, {found['nodes']} nodes, {found['cpu_s']:.0f} s CPU"
+        f"{found['missed']} missed, {found['brief']} brief, {found['nodes']} nodes, "
+        f"{found['cpu_s']:.0f} s CPU"
     )
 
 
@@ -204,7 +206,7 @@ def _followed(source: Path, world: World, options: argparse.Namespace) -> Found:
     """Drive three rounds in the changed building on the old map."""
     changed = next_day(world, 1)
     path = options.out / f"follow-{_key(options.world)}.lemto"
-    for end in (".lemto", ".born.json"):
+    for end in ENDS:
         path.with_suffix(end).write_bytes(source.with_suffix(end).read_bytes())
     shares = [still_true(path, changed)]
     for seed in range(3):
@@ -288,7 +290,7 @@ def _print_quality(scores: Iterable[Found]) -> None:
 
 
 def _key(name: str) -> str:
-    return Path(name).name.replace(":", "_")
+    return Path(name).name.replace(":", "_").replace(".", "_")  # a dot would begin the suffix of each file
 
 
 PARTS: dict[str, Callable[[argparse.Namespace], None]] = {
