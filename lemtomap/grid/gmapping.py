@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from lemtomap.grid import particles
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.mapper import Tracker, roll_and_integrate
-from lemtomap.grid.matching import Match
-from lemtomap.grid.motion import between, compose, odometry_uncertainty
+from lemtomap.grid.matching import Match, refused
+from lemtomap.grid.motion import between, compose, odometry_drift, odometry_uncertainty
 from lemtomap.grid.scan import Beams
 from lemtomap.grid.window import Window
 from lemtomap.se2 import Pose
@@ -82,16 +82,24 @@ class RollingGmapping(Tracker):
         return self._particles[self._best].T_grid_base
 
     def _move_and_weigh(self, beams: Beams, tracked: Match) -> None:
-        """Draw each pose from its proposal and weigh it by how well the scan fits its window (lines 7-16)."""
+        """Draw each pose from its proposal and weigh it by how well the scan fits its window (lines 7-16).
+
+        A scan that fits nowhere says nothing: then a particle moves as odometry may have it, and where even
+        the best finds no fit none is weighed, else the luckiest of many chance fits would win.
+        """
         step = between(self._particles[self._best].T_grid_base, tracked.T_grid_base)
-        uncertainty = odometry_uncertainty(step, self.config)
+        uncertainty, drift = odometry_uncertainty(step, self.config), odometry_drift(step, self.config)
         for index, particle in enumerate(self._particles):
             if index == self._best:
                 particle.T_grid_base = tracked.T_grid_base  # the best stays at the mode of its proposal
                 continue
-            match = self._match(beams, compose(particle.T_grid_base, step), uncertainty, particle.window)
-            gain = match.diversity * (match.quality - tracked.quality)
-            particle.log_weight += self.config.weight_per_quality * gain
+            prior = compose(particle.T_grid_base, step)
+            match = refused(prior, drift)
+            if tracked.accepted:
+                found = self._match(beams, prior, uncertainty, particle.window)
+                match = found if found.accepted else match
+                gain = match.diversity * (match.quality - tracked.quality)
+                particle.log_weight += self.config.weight_per_quality * gain
             particle.T_grid_base = self._draw(match)
 
     def _draw(self, match: Match) -> Pose:

@@ -48,6 +48,21 @@ def odometry_uncertainty(step: Pose, config: SlamConfig) -> Uncertainty:
     )
 
 
+def odometry_drift(step: Pose, config: SlamConfig) -> Uncertainty:
+    """Return how far odometry drifts over a step, one standard deviation.
+
+    The errors of pieces as long as from one integration to the next are independent: a random walk. The
+    uncertainty above grows in proportion, for a match must find what one slip did.
+    """
+    x, y, yaw = step.tolist()
+    pieces_m = math.hypot(x, y) * config.integrate_distance_m
+    pieces_rad = abs(yaw) * config.integrate_turn_rad
+    return Uncertainty(
+        math.sqrt(config.odometry_m_per_m**2 * pieces_m + config.odometry_m_per_rad**2 * pieces_rad),
+        math.sqrt(config.odometry_rad_per_rad**2 * pieces_rad + config.odometry_rad_per_m**2 * pieces_m),
+    )
+
+
 class WheelTrust:
     """Learns from the matches how much farther off this robot's odometry is along its way than the settings
     say: slipping wheels, and stamps that do not fit the scans.

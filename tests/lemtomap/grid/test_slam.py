@@ -87,6 +87,18 @@ def test_after_a_stretch_with_nothing_in_sight_new_walls_are_mapped_where_odomet
     np.testing.assert_allclose(update.T_grid_base, here, atol=0.05)
 
 
+def test_after_a_stretch_with_nothing_in_sight_particles_spread_no_further_than_wheels_drift():
+    """Spread as wide as a match searches, the luckiest chance fit would win."""
+    slam = GrowingGmapping(replace(SlamConfig(), particles=30))
+    hall = [*box(-3.0, -2.0, 1.0, 2.0)[:3], ((20.0, -6.0), (20.0, 6.0))]
+    for i, x in enumerate(np.arange(0.0, 16.0, 0.05)):
+        here = np.array([x, 0.0, 0.0])
+        slam.update(scan_at(here, hall, 0.1 * i), Odometry(0.1 * i, here))
+    spread_rad = np.std(slam.particles()[:, 2])
+    assert 0.05 < spread_rad < 0.3
+    assert np.ptp([particle.log_weight for particle in slam._particles]) < 2.0
+
+
 def test_published_correction_never_leaps_unless_flagged():
     slam = WindowMatcher(SlamConfig())
     before = None
