@@ -194,6 +194,9 @@ class TopoMapper:
         self.graph.put_node(replace(node, visits=node.visits + 1))
         self._take_places()
         self._align_associated()
+        seam = self._neighbours.seam_edge(node_id, self.graph, self.local, self._require().grid)
+        if seam is not None:
+            self.graph.add_edge(seam)
         if self._recogniser is not None:
             self._recogniser.at_node(self, born=False)
 

@@ -1,6 +1,7 @@
 """Near-neighbour edges: to every place that can be driven to in a straight line (thesis, section 3-3-2)."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.types import EdgeType, GridView
+
+SEAM_SHARE = 2.0
+"""Nodes side by side are apart when the way along the edges is so many times as long as an edge may be."""
 
 
 class NeighbourFinder:
@@ -25,9 +29,22 @@ class NeighbourFinder:
         A candidate lies within the local radius (D_nn) over edges, stands in the window by measurement or by
         a sure prediction, is on the same level and directly navigable, and the edge shortens the way to it.
         """
+        yield from self._edges_to(
+            local.standings.keys(), node_id, graph, local, grid, self._config.near_neighbour_sigma_m
+        )
+
+    def _edges_to(
+        self,
+        others: Container[int],
+        node_id: int,
+        graph: PagedGraph,
+        local: LocalMap,
+        grid: GridView,
+        sigma_m: float,
+    ) -> Iterator[Edge]:
         level = graph.node(node_id).level
         here = local.standings[node_id]
-        for other_id, line_m in self._candidates(node_id, local):
+        for other_id, line_m in self._candidates(others, node_id, local, sigma_m):
             there = local.standings[other_id]
             if graph.node(other_id).level != level or graph.edge_between(node_id, other_id) is not None:
                 continue
@@ -36,23 +53,32 @@ class NeighbourFinder:
             if directly_navigable(grid, here.T_grid_node, there.T_grid_node, self._config):
                 yield self._edge(node_id, other_id, local)
 
-    def _candidates(self, node_id: int, local: LocalMap) -> list[tuple[int, float]]:
+    def seam_edge(self, node_id: int, graph: PagedGraph, local: LocalMap, grid: GridView) -> Edge | None:
+        """Return an edge to the nearest node beside a node visited again that is far along the edges.
+
+        Two rounds through one corridor leave two chains of nodes side by side when the second was driven
+        before its closure was found, and a bare corridor never tells how far along it the two are apart. The
+        robot can go from one to the other all the same; unless an edge says so, a route may lead along one
+        chain to its end and back along the other. The edge tells the solve nothing: its share is 0.
+        """
+        sigma_m, seam_m = self._config.seam_sigma_m, SEAM_SHARE * self._config.near_neighbour_max_m
+        far = {other_id for other_id, reached in local.reached.items() if reached.distance_m > seam_m}
+        if not far or not _is_sure(local.standings[node_id], sigma_m):
+            return None
+        edge = next(self._edges_to(far, node_id, graph, local, grid, sigma_m), None)
+        return None if edge is None else replace(edge, share=0.0)
+
+    def _candidates(
+        self, others: Container[int], node_id: int, local: LocalMap, sigma_m: float
+    ) -> list[tuple[int, float]]:
         x, y = local.standings[node_id].T_grid_node[:2]
         found = []
         for other_id, standing in local.standings.items():
             line_m = round(float(np.hypot(standing.T_grid_node[0] - x, standing.T_grid_node[1] - y)), 6)
-            if (
-                other_id != node_id
-                and line_m <= self._config.near_neighbour_max_m
-                and self._is_sure(standing)
-            ):
+            is_near = other_id != node_id and line_m <= self._config.near_neighbour_max_m
+            if is_near and other_id in others and _is_sure(standing, sigma_m):
                 found.append((other_id, line_m))
         return sorted(found, key=lambda candidate: (candidate[1], candidate[0]))
-
-    def _is_sure(self, standing: Standing) -> bool:
-        """Tell whether a node stands in the window by measurement, or is predicted well enough."""
-        variance = float(np.linalg.eigvalsh(standing.covariance[:2, :2])[-1])
-        return standing.anchored or variance <= self._config.near_neighbour_sigma_m**2
 
     def _shortens(
         self, node_id: int, other_id: int, line_m: float, graph: PagedGraph, reached: dict[int, Reached]
@@ -71,6 +97,12 @@ class NeighbourFinder:
         covariance = chain_covariance(here.covariance, T_node_other, there.covariance)
         share = independent_share(covariance, _chain(other_id, local.reached)) if there.anchored else 0.0
         return Edge(0, node_id, other_id, T_node_other, covariance, EdgeType.NEAR_NEIGHBOUR, share)
+
+
+def _is_sure(standing: Standing, sigma_m: float) -> bool:
+    """Tell whether a node stands in the window by measurement, or is predicted well enough."""
+    variance = float(np.linalg.eigvalsh(standing.covariance[:2, :2])[-1])
+    return standing.anchored or variance <= sigma_m**2
 
 
 def directly_navigable(grid: GridView, start: Pose, end: Pose, config: TopoConfig) -> bool:

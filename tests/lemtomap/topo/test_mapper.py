@@ -70,6 +70,25 @@ def test_no_near_neighbour_edge_goes_through_a_wall_or_the_unknown(mapper):
     assert edges(mapper, EdgeType.NEAR_NEIGHBOUR)
 
 
+def test_two_chains_side_by_side_are_joined_when_one_is_driven_again(mapper):
+    wall = room(walls=[(-7, -0.06, 7, 0.06)])
+    stamp = lead(mapper, [(-6, -0.4), (7.5, -0.4), (7.5, 0.4), (-6, 0.4)], wall)
+    crossing = [edge for edge in edges(mapper, EdgeType.NEAR_NEIGHBOUR) if crosses(mapper, edge, below_x=2.0)]
+    assert not crossing  # behind the wall, as where the two chains' places are not known to each other yet
+    lead(mapper, [(-6, 0.4), (4, 0.4)], room(), start_s=stamp)
+    joins = [edge for edge in edges(mapper, EdgeType.NEAR_NEIGHBOUR) if crosses(mapper, edge, below_x=2.0)]
+    assert 1 <= len(joins) <= 4  # one for each stretch, not one for each node
+    assert all(edge.share == 0.0 for edge in joins)  # the solve learns nothing from them
+
+
+def crosses(mapper, edge, below_x):
+    poses = mapper.view().T_grid_node
+    ends = [poses.get(edge.source_id), poses.get(edge.target_id)]
+    if any(end is None for end in ends):
+        return False
+    return ends[0][1] * ends[1][1] < 0.0 and max(ends[0][0], ends[1][0]) < below_x
+
+
 def test_only_a_neighbour_or_a_new_node_follows_as_associated_node(mapper):
     wall = room(walls=[(-3, -0.06, 3, 0.06)])
     lead(mapper, [(-2, -0.4), (4.5, -0.4), (4.5, 0.4), (-2, 0.4)], wall)
