@@ -29,29 +29,49 @@ WHOLE = 65535.0
 
 
 @njit(nogil=True, cache=True)
+def _reaches_out(offsets: Array, n: int, origin: Array, gx: int, gy: int) -> bool:
+    """Tell whether the cells around one may lie outside the window, or across the ring's seam in memory."""
+    reach = abs(offsets[offsets.shape[0] - 1, 0]) + abs(offsets[offsets.shape[0] - 1, 1])  # the furthest one
+    x, y, col, row = gx - origin[0], gy - origin[1], gx % n, gy % n
+    return bool(
+        min(min(x, y), min(col, row)) < reach or max(max(x, y), max(col, row)) >= n - reach
+    )
+
+
+@njit(nogil=True, cache=True)
 def _renew_nearest(
     evidence: Array, nearest: Array, offsets: Array, n: int, origin: Array, gx: int, gy: int
 ) -> None:
-    """Search the nearest occupied cell anew."""
+    """Search the nearest occupied cell anew, beyond the one that was nearest and is no longer occupied."""
     found = NONE
-    for o in range(offsets.shape[0]):
-        cx, cy = gx + offsets[o, 0], gy + offsets[o, 1]
-        if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
-            continue
-        if evidence[cy % n, cx % n] > 0:
+    edge = _reaches_out(offsets, n, origin, gx, gy)
+    row, col = gy % n, gx % n
+    for o in range(nearest[row, col] + 1, offsets.shape[0]):
+        if edge:
+            cx, cy = gx + offsets[o, 0], gy + offsets[o, 1]
+            if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
+                continue
+            if evidence[cy % n, cx % n] > 0:
+                found = o
+                break
+        elif evidence[row + offsets[o, 1], col + offsets[o, 0]] > 0:
             found = o
             break
-    nearest[gy % n, gx % n] = found
+    nearest[row, col] = found
 
 
 @njit(nogil=True, cache=True)
 def _spread_new(nearest: Array, offsets: Array, n: int, origin: Array, gx: int, gy: int) -> None:
     """A cell became occupied: it may be the nearest of the cells around it."""
+    edge = _reaches_out(offsets, n, origin, gx, gy)
+    row0, col0 = gy % n, gx % n
     for o in range(offsets.shape[0]):
-        cx, cy = gx - offsets[o, 0], gy - offsets[o, 1]
-        if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
-            continue
-        row, col = cy % n, cx % n
+        row, col = row0 - offsets[o, 1], col0 - offsets[o, 0]
+        if edge:
+            cx, cy = gx - offsets[o, 0], gy - offsets[o, 1]
+            if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
+                continue
+            row, col = cy % n, cx % n
         nearest[row, col] = min(nearest[row, col], o)
 
 
@@ -60,13 +80,16 @@ def _orphan(
     nearest: Array, offsets: Array, n: int, origin: Array, gx: int, gy: int, orphans: Array, count: int
 ) -> int:
     """A cell is no longer occupied: list the cells whose nearest it was."""
+    edge = _reaches_out(offsets, n, origin, gx, gy)
+    row0, col0 = gy % n, gx % n
     for o in range(offsets.shape[0]):
         cx, cy = gx - offsets[o, 0], gy - offsets[o, 1]
-        if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
-            continue
-        row, col = cy % n, cx % n
+        row, col = row0 - offsets[o, 1], col0 - offsets[o, 0]
+        if edge:
+            if cx < origin[0] or cy < origin[1] or cx >= origin[0] + n or cy >= origin[1] + n:
+                continue
+            row, col = cy % n, cx % n
         if nearest[row, col] == o and count < orphans.shape[0]:
-            nearest[row, col] = NONE
             orphans[count, 0], orphans[count, 1] = cx, cy
             count += 1
     return count
@@ -117,24 +140,22 @@ def _clear_ray(
             col -= n
         if row >= n:
             row -= n
-        if mark[row, col] != tag:
+        before = evidence[row, col]
+        if before > floor and mark[row, col] != tag:  # most are as free as can be: no need to look whether marked
             mark[row, col] = tag
-            before = evidence[row, col]
-            if before > floor:
-                after = before - miss
-                if after == 0:
-                    after = -1
-                evidence[row, col] = max(after, floor)
-                if before > 0 and after <= 0:
-                    averaged[row, col] = 0
-                    lost[lost_count, 0], lost[lost_count, 1] = x + origin[0], y + origin[1]
-                    lost_count += 1
-        if next_x < next_y:
-            x += step_x
-            next_x += per_x
-        else:
-            y += step_y
-            next_y += per_y
+            after = before - miss
+            if after == 0:
+                after = -1
+            evidence[row, col] = max(after, floor)
+            if before > 0 and after <= 0:
+                averaged[row, col] = 0
+                lost[lost_count, 0], lost[lost_count, 1] = x + origin[0], y + origin[1]
+                lost_count += 1
+        along_x = next_x < next_y  # by selection: which way a ray goes next no branch predictor guesses
+        x += step_x if along_x else 0
+        y += 0 if along_x else step_y
+        next_x += per_x if along_x else 0.0
+        next_y += 0.0 if along_x else per_y
     return lost_count
 
 
@@ -286,19 +307,23 @@ def shift(window: Any, offsets: Array, new_x: int, new_y: int) -> None:
 
 
 @njit(nogil=True, cache=True)
-def occupancy(evidence: Array, origin: Array, table: Array, out: Array) -> None:
-    """Write the window as -1 unknown, 0..100 occupied, [0, 0] at its least corner; table: int8 (256,) by
-    evidence + 128.
+def occupancy(evidence: Array, table: Array, out: Array) -> None:
+    """Write each cell as -1 unknown, 0..100 occupied, where evidence has it; table: int8 (256,) by evidence +
+    128.
+
+    Most cells are like the ones beside them, so eight in a row that equal the last eight are not looked up.
     """
-    n = evidence.shape[0]
-    for row in range(n):
-        source = (origin[1] + row) % n
-        start = origin[0] % n
-        for col in range(n):
-            at = start + col
-            if at >= n:
-                at -= n
-            out[row, col] = table[evidence[source, at] + 128]
+    cells, shown = evidence.reshape(-1), out.reshape(-1)
+    whole = cells.shape[0] // 8 * 8
+    eights, shown_eights = cells[:whole].view(np.int64), shown[:whole].view(np.int64)
+    for k in range(eights.shape[0]):
+        if k > 0 and eights[k] == eights[k - 1]:
+            shown_eights[k] = shown_eights[k - 1]
+            continue
+        for i in range(8 * k, 8 * k + 8):
+            shown[i] = table[cells[i] + 128]
+    for i in range(whole, cells.shape[0]):
+        shown[i] = table[cells[i] + 128]
 
 
 @njit(nogil=True, cache=True)

@@ -185,11 +185,21 @@ class Window:
     def view(self, stamp_s: float) -> GridView:
         """Return an immutable snapshot."""
         evidence, origin = self.arrays.evidence, self.arrays.origin
-        out = np.empty(evidence.shape, dtype=np.int8)
-        kernels.occupancy(evidence, origin, percent_table(), out)
+        shown = np.empty(evidence.shape, dtype=np.int8)
+        kernels.occupancy(evidence, percent_table(), shown)
+        out = _unrolled(shown, int(origin[1]) % self.cells, int(origin[0]) % self.cells)
         out.setflags(write=False)
         corner = (float(origin[0]) * self.resolution_m, float(origin[1]) * self.resolution_m)
         return GridView(stamp_s, out, self.resolution_m, corner)
+
+
+def _unrolled(ring: NDArray[np.int8], row: int, col: int) -> NDArray[np.int8]:
+    """Return a ring of cells with cell (row, col) first: four blocks to copy."""
+    n = len(ring)
+    out = np.empty_like(ring)
+    out[: n - row, : n - col], out[: n - row, n - col :] = ring[row:, col:], ring[row:, :col]
+    out[n - row :, : n - col], out[n - row :, n - col :] = ring[:row, col:], ring[:row, :col]
+    return out
 
 
 @cache
