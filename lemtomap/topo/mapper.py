@@ -261,14 +261,19 @@ class TopoMapper:
     def _anchor_beside(self, node_id: int) -> None:
         """Match the nearest well-predicted node that the window does not hold, so that edges may join it."""
         limit_m, sigma_m = self.config.near_neighbour_max_m, self.config.implicit_sigma_m
-        beside = [
+        away = [
             (self._distance_m(other_id), other_id)
             for other_id, standing in self.local.standings.items()
             if not standing.anchored
-            and float(np.linalg.eigvalsh(standing.covariance[:2, :2])[-1]) <= sigma_m**2
         ]
-        if beside and min(beside)[0] <= limit_m and self._measured(min(beside)[1]).measured:
-            self.local.settle(node_id)
+        for away_m, other_id in sorted(away):
+            if away_m > limit_m:
+                return
+            covariance = self.local.standings[other_id].covariance
+            if float(np.linalg.eigvalsh(covariance[:2, :2])[-1]) <= sigma_m**2:
+                if self._measured(other_id).measured:
+                    self.local.settle(node_id)
+                return
 
     def _take_places(self) -> None:
         now = self._require()

@@ -126,6 +126,8 @@ class PagedGraph:
                 continue
             reached[node_id] = Reached(node_id, distance_m, via)
             for other_id, length_m, edge in self._ways_from(node_id):
+                if other_id in reached:
+                    continue
                 further_m = round(distance_m + length_m, 6)  # equal ways tie in every frame
                 if further_m <= radius_m and further_m < best.get(other_id, radius_m + 1.0):
                     best[other_id] = further_m

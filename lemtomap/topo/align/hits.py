@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, transform
+from lemtomap.se2 import Pose
 from lemtomap.topo.align.gathering import kernels
 from lemtomap.types import GridView
 
@@ -41,10 +41,15 @@ class HitMap:
                 return
             self._way_m += step_m
         self._last = np.array(T_grid_base)
-        points = transform(T_grid_base, points_base)
-        at = (float(T_grid_base[0]), float(T_grid_base[1]))
         kernels.add_hits(
-            points, *at, CELL_M, self._owner, self._taken, self._sums, self._way_m, self._recent_m
+            points_base,
+            self._last,
+            CELL_M,
+            self._owner,
+            self._taken,
+            self._sums,
+            self._way_m,
+            self._recent_m,
         )
 
     def around(

@@ -18,18 +18,18 @@ def line_normals(
     """
     n = points_m.shape[0]
     order = np.argsort(points_m[:, 0])
+    xs, ys = points_m[order, 0], points_m[order, 1]  # side by side in memory, as they are visited
     result = np.zeros((n, 3))
     reach2 = reach_m * reach_m
     for k in range(n):
         i = order[k]
-        x, y = points_m[i, 0], points_m[i, 1]
+        x, y = xs[k], ys[k]
         count, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
         for way in range(2):
             step = 1 if way == 0 else -1
             m = k if way == 0 else k - 1
             while 0 <= m < n:
-                j = order[m]
-                dx, dy = points_m[j, 0] - x, points_m[j, 1] - y
+                dx, dy = xs[m] - x, ys[m] - y
                 if abs(dx) > reach_m:
                     break
                 if dx * dx + dy * dy <= reach2:

@@ -7,15 +7,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 Values = NDArray[np.float64]
+Points = NDArray[np.floating]
 Indices = NDArray[np.int32]
 Cells = NDArray[np.int8]
 
 
 @njit(nogil=True, cache=True)
 def add_hits(
-    points: Values,
-    from_x: float,
-    from_y: float,
+    points_base: Points,
+    T_grid_base: Values,
     cell: float,
     owner: Indices,
     taken: Cells,
@@ -23,20 +23,25 @@ def add_hits(
     now: float,
     recent: float,
 ) -> None:
-    """Add grid-frame points seen from (from_x, from_y) to a ring of cells: owner (S, S, 2) is whose cell it
+    """Add points seen from a base at T_grid_base to a ring of cells: owner (S, S, 2) is whose cell it
     is, taken (S, S) 1 where it holds anything, sums (S, S, 6) x, y, n, when it was hit last in metres of way
     like `now`, and the unit vectors to where it was seen from.
 
     A cell that last belonged to another place of the building, or was hit too long ago, starts anew.
     """
     size = owner.shape[0]
-    for k in range(points.shape[0]):
-        x, y = points[k, 0], points[k, 1]
+    from_x, from_y = T_grid_base[0], T_grid_base[1]
+    cos, sin = math.cos(T_grid_base[2]), math.sin(T_grid_base[2])
+    for k in range(points_base.shape[0]):
+        along, aside = float(points_base[k, 0]), float(points_base[k, 1])
+        x = from_x + cos * along - sin * aside
+        y = from_y + sin * along + cos * aside
         if not (math.isfinite(x) and math.isfinite(y)):
             continue
         col, row = math.floor(x / cell), math.floor(y / cell)
         r, c = row % size, col % size
-        if owner[r, c, 0] != row or owner[r, c, 1] != col or now - sums[r, c, 3] > recent:
+        is_new = not taken[r, c] or owner[r, c, 0] != row or owner[r, c, 1] != col
+        if is_new or now - sums[r, c, 3] > recent:
             owner[r, c, 0], owner[r, c, 1] = row, col
             taken[r, c] = 1
             sums[r, c, :] = 0.0
@@ -71,6 +76,9 @@ def collect_hits(
 ) -> Values:
     """Return the mean hits in a square, newer than `since`, that the window believes, float64 (N, 4): x, y
     and the mean unit vector to where it was seen from. The ring's side must be a multiple of 8.
+
+    Cells hit before `since` are given back: nobody will ask for them again, and left taken they would slow
+    down every later call, as in time most of the ring has been hit.
     """
     size = owner.shape[0]
     eights = taken.view(np.int64)
@@ -93,9 +101,12 @@ def collect_hits(
             if c & 7 == 0 and eights[r, c >> 3] == 0:  # most of 160,000 cells hold nothing
                 col, c = col + 7, c + 7
                 continue
-            if not taken[r, c] or owner[r, c, 0] != row or owner[r, c, 1] != col:
+            if not taken[r, c]:
                 continue
-            if sums[r, c, 2] < least or sums[r, c, 3] < since:
+            if sums[r, c, 3] < since:
+                taken[r, c] = 0
+                continue
+            if owner[r, c, 0] != row or owner[r, c, 1] != col or sums[r, c, 2] < least:
                 continue
             x, y = sums[r, c, 0] / sums[r, c, 2], sums[r, c, 1] / sums[r, c, 2]
             i, j = math.floor((y - origin_y) / resolution), math.floor((x - origin_x) / resolution)
