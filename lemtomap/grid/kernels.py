@@ -31,11 +31,10 @@ WHOLE = 65535.0
 @njit(nogil=True, cache=True)
 def _reaches_out(offsets: Array, n: int, origin: Array, gx: int, gy: int) -> bool:
     """Tell whether the cells around one may lie outside the window, or across the ring's seam in memory."""
-    reach = abs(offsets[offsets.shape[0] - 1, 0]) + abs(offsets[offsets.shape[0] - 1, 1])  # the furthest one
+    last = offsets.shape[0] - 1  # the furthest: no coordinate of any is larger than both of its together
+    reach = abs(offsets[last, 0]) + abs(offsets[last, 1])
     x, y, col, row = gx - origin[0], gy - origin[1], gx % n, gy % n
-    return bool(
-        min(min(x, y), min(col, row)) < reach or max(max(x, y), max(col, row)) >= n - reach
-    )
+    return bool(min(x, y, col, row) < reach or max(x, y, col, row) >= n - reach)
 
 
 @njit(nogil=True, cache=True)
@@ -141,7 +140,7 @@ def _clear_ray(
         if row >= n:
             row -= n
         before = evidence[row, col]
-        if before > floor and mark[row, col] != tag:  # most are as free as can be: no need to look whether marked
+        if before > floor and mark[row, col] != tag:  # most are at the floor already
             mark[row, col] = tag
             after = before - miss
             if after == 0:

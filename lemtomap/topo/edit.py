@@ -17,7 +17,6 @@ __all__ = [
     "delete_node",
     "name_node",
     "resolve_node",
-    "set_area",
     "set_level",
     "undo",
     "unname",
@@ -95,14 +94,6 @@ def set_level(store: TopoStore, node_id: int, level: int, stamp_s: float = 0.0) 
         for edge in _wrong_levels(store, node_id, level):
             recording.touch("edge", edge.edge_id)
             store.delete_edge(edge.edge_id)
-
-
-def set_area(store: TopoStore, node_id: int, area_id: int, stamp_s: float = 0.0) -> None:
-    """Put a node into an area."""
-    node = _node(store, node_id)
-    with recorded(store, f"put node {node_id} into area {area_id}", stamp_s) as recording:
-        recording.touch("node", node_id)
-        store.put_node(replace(node, area_id=area_id))
 
 
 def edge_between(store: TopoStore, a: int, b: int) -> Edge:

@@ -4,7 +4,7 @@ An edge's covariance is that of a small motion of the target in its *own* axes (
 g2o and gtsam): the true relative pose is compose(T_source_target, xi), xi ~ N(0, covariance).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from math import hypot
 from typing import NamedTuple
@@ -183,13 +183,3 @@ def sure_of(information: Covariance, *, weak_axis: float = WEAK_AXIS) -> Covaria
         information = keep @ information @ keep
     values, axes = np.linalg.eigh(information)
     return np.asarray(axes @ np.diag(1.0 / np.maximum(values, 1.0)) @ axes.T)
-
-
-@dataclass(frozen=True, slots=True)
-class Area:
-    """A room or corridor: nodes with the same area ID belong to it."""
-
-    area_id: int
-    name: str = ""
-    kind: str = ""
-    tags: tuple[str, ...] = field(default=())

@@ -38,13 +38,7 @@ def learn(event: NavEvent, graph: PagedGraph, associated_id: int, T_node_base: P
             if graph.store.node(node_id) is not None:
                 graph.store.put_ground(node_id, picture)
         case OpeningDone(number, closed):
-            _end_opening(graph, number, OpeningState.CLOSED if closed else OpeningState.EXPLORED)
-
-
-def _end_opening(graph: PagedGraph, number: int, state: OpeningState) -> None:
-    for opening in graph.store.placeholders():
-        if opening.placeholder_id == number:
-            graph.store.put_placeholder(replace(opening, state=state))
+            graph.store.end_placeholder(number, OpeningState.CLOSED if closed else OpeningState.EXPLORED)
 
 
 def _learn_time(graph: PagedGraph, from_id: int, to_id: int, time_s: float) -> None:

@@ -5,6 +5,7 @@ measured (at its birth, or by a match of its localisation data). The rest follow
 is ever stored: it is the window's view of the graph, gone with the window.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.solve import Problem, solve_local
-from lemtomap.types import EdgeType, GridView
+from lemtomap.types import GridView
 
 EDGE_MARGIN_M = 1.0  # a node nearer to the window's border than this has lost its surroundings
 
@@ -70,6 +71,22 @@ class LocalMap:
         standing = self.standings[node_id]
         if float(np.trace(standing.covariance[:2, :2])) < 2.0 * widest_m**2:
             self.standings[node_id] = replace(standing, covariance=widen * standing.covariance)
+
+    def predicted_near(self, T_grid_base: Pose, within_m: float, sigma_m: float) -> int:
+        """Return the nearest node that the graph predicts this well and the window does not hold; 0: none."""
+        x, y, _ = T_grid_base.tolist()
+        away = [
+            (math.hypot(standing.T_grid_node[0] - x, standing.T_grid_node[1] - y), node_id)
+            for node_id, standing in self.standings.items()
+            if not standing.anchored
+        ]
+        for away_m, node_id in sorted(away):
+            if away_m > within_m:
+                break
+            covariance = self.standings[node_id].covariance
+            if float(np.linalg.eigvalsh(covariance[:2, :2])[-1]) <= sigma_m**2:
+                return node_id
+        return 0
 
     def release_matched(self) -> None:
         """Let go of all nodes whose poses rest on matches and closures (one of them proved wrong)."""
@@ -149,27 +166,3 @@ class LocalMap:
             for edge in self._graph.edges_of(node_id)
             if edge.source_id == node_id and edge.target_id in settled
         ]
-
-
-class EdgePicture:
-    """The edges among the nodes that stand nearby, for pictures; found again only when the map changed."""
-
-    def __init__(self, graph: PagedGraph, local: LocalMap) -> None:
-        self._graph = graph
-        self._local = local
-        self._key = (-1, -1)
-        self._edges: list[tuple[int, int, int, EdgeType]] = []
-
-    def edges(self, associated_id: int) -> list[tuple[int, int, int, EdgeType]]:
-        """Return (edge ID, source, target, type)."""
-        key = (self._graph.store.version, associated_id)
-        if self._key != key:
-            self._key = key
-            standings = self._local.standings
-            self._edges = [
-                (edge.edge_id, edge.source_id, edge.target_id, edge.type)
-                for node_id in standings
-                for edge in self._graph.edges_of(node_id)
-                if edge.source_id == node_id and edge.target_id in standings
-            ]
-        return self._edges

@@ -15,10 +15,11 @@ from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
 from lemtomap.topo.levels import Lift, put_on_level
-from lemtomap.topo.local import EdgePicture, LocalMap, Standing
+from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.neighbours import NeighbourFinder, in_sight
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.protocols import NotStarted, Recogniser, Transform
+from lemtomap.topo.snapshots import Snapshots
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
 from lemtomap.topo.undoing import take_back
@@ -78,7 +79,7 @@ class TopoMapper:
         self._tried_m = 0.0
         self._now: _Now | None = None
         self._lift: Lift | None = None
-        self._picture = EdgePicture(self.graph, self.local)
+        self._snapshots = Snapshots(self.graph, self.local)
 
     @property
     def associated_id(self) -> int:
@@ -260,20 +261,10 @@ class TopoMapper:
 
     def _anchor_beside(self, node_id: int) -> None:
         """Match the nearest well-predicted node that the window does not hold, so that edges may join it."""
-        limit_m, sigma_m = self.config.near_neighbour_max_m, self.config.implicit_sigma_m
-        away = [
-            (self._distance_m(other_id), other_id)
-            for other_id, standing in self.local.standings.items()
-            if not standing.anchored
-        ]
-        for away_m, other_id in sorted(away):
-            if away_m > limit_m:
-                return
-            covariance = self.local.standings[other_id].covariance
-            if float(np.linalg.eigvalsh(covariance[:2, :2])[-1]) <= sigma_m**2:
-                if self._measured(other_id).measured:
-                    self.local.settle(node_id)
-                return
+        at, config = self._require().slam.T_grid_base, self.config
+        beside_id = self.local.predicted_near(at, config.near_neighbour_max_m, config.implicit_sigma_m)
+        if beside_id and self._measured(beside_id).measured:
+            self.local.settle(node_id)
 
     def _take_places(self) -> None:
         now = self._require()
@@ -387,23 +378,8 @@ class TopoMapper:
 
     def view(self, particles: NDArray[np.float64] | None = None) -> MapView:
         """Return an immutable snapshot of the neighbourhood. Raises NotStarted before the first scan."""
-        now = self._require()
-        poses = {node_id: standing.T_grid_node for node_id, standing in self.local.standings.items()}
-        names = {node_id: name for name, node_id in self.store.names().items() if node_id in poses}
-        return MapView(
-            stamp_s=now.slam.stamp_s,
-            grid=now.grid,
-            T_grid_odom=now.slam.T_grid_odom,
-            T_grid_base=now.slam.T_grid_base,
-            associated_id=self._associated_id,
-            T_grid_node=poses,
-            edges=self._picture.edges(self._associated_id),
-            quality=self._quality(),
-            diversity=now.slam.diversity,
-            lost=self.lost,
-            particles=particles,
-            names=names,
-        )
+        now, at_id = self.now, self._associated_id
+        return self._snapshots.take(now, at_id, self._quality(), lost=self.lost, particles=particles)
 
     def _quality(self) -> float:
         """Return how likely T_node_base is right, 0 to 1; nothing is while the robot is lost."""

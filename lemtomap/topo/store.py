@@ -14,7 +14,7 @@ from typing import Any, Self
 
 from lemtomap.errors import BadMap
 from lemtomap.topo import schema
-from lemtomap.topo.graph import Area, Edge, Mark, Node, Place, Placeholder
+from lemtomap.topo.graph import Edge, Mark, Node, OpeningState, Place, Placeholder
 from lemtomap.topo.rows import (
     EDGE_COLUMNS,
     NODE_COLUMNS,
@@ -325,16 +325,6 @@ class TopoStore:
         """Give a node a name; a name belongs to one node."""
         self._write("REPLACE INTO name(name, node) VALUES(?, ?)", (name, node_id))
 
-    def areas(self) -> dict[int, Area]:
-        """Return all areas that were described."""
-        rows = self.query("SELECT id, name, kind, tags FROM area ORDER BY id")
-        return {row[0]: Area(row[0], row[1], row[2], tuple(row[3].split())) for row in rows}
-
-    def put_area(self, area: Area) -> None:
-        """Describe an area."""
-        values = (area.area_id, area.name, area.kind, " ".join(area.tags))
-        self._write("REPLACE INTO area(id, name, kind, tags) VALUES(?, ?, ?, ?)", values)
-
     def add_placeholder(self, opening: Placeholder) -> Placeholder:
         """Write an unexplored opening; returns it with its ID."""
         number = int(self._one("SELECT coalesce(max(id), 0) + 1 FROM placeholder"))
@@ -356,6 +346,10 @@ class TopoStore:
                 str(opening.state),
             ),
         )
+
+    def end_placeholder(self, number: int, state: OpeningState) -> None:
+        """Say what became of an opening; of one that is not there nothing is said."""
+        self._write("UPDATE placeholder SET state = ? WHERE id = ?", (str(state), number))
 
     def placeholders(self) -> list[Placeholder]:
         """Return all openings."""

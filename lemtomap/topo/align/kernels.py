@@ -34,23 +34,20 @@ def nearest_field(
             for side in range(2):
                 for across in range(size):
                     c = across if side == 0 else size - 1 - across
-                    best, best_sq = field[r, c], -1.0  # -1: not asked for yet
+                    x, y = low_x + (c + 0.5) * cell, low_y + (r + 0.5) * cell
+                    best = field[r, c]
+                    best_sq = reach * reach
+                    if best >= 0:
+                        best_sq = (targets[best, 0] - x) ** 2 + (targets[best, 1] - y) ** 2
                     dr = -1 if sweep == 0 else 1
                     dc = -1 if side == 0 else 1
                     for a, b in ((dr, 0), (0, dc), (dr, dc), (dr, -dc)):
-                        if not (0 <= r + a < size and 0 <= c + b < size):
-                            continue
-                        k = field[r + a, c + b]
-                        if k < 0 or k == best:  # mostly
-                            continue
-                        x, y = low_x + (c + 0.5) * cell, low_y + (r + 0.5) * cell
-                        if best_sq < 0.0 and best < 0:
-                            best_sq = reach * reach
-                        elif best_sq < 0.0:
-                            best_sq = (targets[best, 0] - x) ** 2 + (targets[best, 1] - y) ** 2
-                        sq = (targets[k, 0] - x) ** 2 + (targets[k, 1] - y) ** 2
-                        if sq < best_sq:
-                            best, best_sq = k, sq
+                        if 0 <= r + a < size and 0 <= c + b < size:
+                            k = field[r + a, c + b]
+                            if k >= 0:
+                                sq = (targets[k, 0] - x) ** 2 + (targets[k, 1] - y) ** 2
+                                if sq < best_sq:
+                                    best, best_sq = k, sq
                     field[r, c] = best
     return field
 

@@ -49,7 +49,6 @@ EDITS = {
     "delete edge": lambda store: edit.delete_edge(store, 2),
     "block": lambda store: edit.block_edge(store, 2, 50.0),
     "level": lambda store: edit.set_level(store, 3, 1),
-    "area": lambda store: edit.set_area(store, 3, 7),
 }
 
 
