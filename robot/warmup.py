@@ -6,6 +6,7 @@ thrown away, drives along an imagined corridor and back first, and is then switc
 explores, leaves its window behind, comes back to places it knows, is lost and finds itself.
 """
 
+import gc
 import tempfile
 from pathlib import Path
 
@@ -56,6 +57,8 @@ def warm_up(config: RobotConfig, slam: str = DEFAULT_SLAM) -> None:
                 turns = index % NAVIGATES_EACH == 0
                 _live(core, T_world_base, before, SCAN_S * index, navigates=turns, bumped=index == BUMPED_AT)
             core.close()
+    gc.collect()
+    gc.freeze()  # what is loaded now stays: a look through all of it for garbage takes tens of milliseconds
 
 
 def _there_and_back() -> NDArray[np.float64]:

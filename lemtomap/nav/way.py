@@ -116,6 +116,8 @@ class WayKeeper:
 
     def _close(self, links: Sequence[Link], moment: Moment) -> None:
         """Plan around these edges from now on, and tell the map."""
+        longest_s = self._config.recovery.block_longest_s
+        self._closings = {e: c for e, c in self._closings.items() if moment.now_s - c[1] < longest_s}
         for edge_id, a, b in {link[0]: link for link in links}.values():
             until_s = self._closed_s[edge_id] = moment.now_s + self._block_s(edge_id, moment.now_s)
             moment.events.append(EdgeBlocked(a, b, until_s))
@@ -128,8 +130,6 @@ class WayKeeper:
         while the robot is at the other one send it to and fro for ever.
         """
         recovery = self._config.recovery
-        longest_s = recovery.block_longest_s
-        self._closings = {e: c for e, c in self._closings.items() if now_s - c[1] < longest_s}
         before, _ = self._closings.get(edge_id, (0, now_s))
         self._closings[edge_id] = (before + 1, now_s)
-        return min(recovery.block_s * recovery.block_growth**before, longest_s)
+        return min(recovery.block_s * recovery.block_growth**before, recovery.block_longest_s)

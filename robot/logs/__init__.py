@@ -2,6 +2,7 @@
 open_log(path)`.
 """
 
+import gc
 import gzip
 import lzma
 import zlib
@@ -54,7 +55,9 @@ def open_log(path: str | Path) -> Log:
     if kind not in _READERS:
         known = ", ".join(sorted(_READERS))
         raise BadLog(f"{path}: unknown kind of log '{kind}': known are {known}, each also with .gz or .xz")
-    return _READERS[kind](path, _lines(path, suffixes[-1]))
+    log = _READERS[kind](path, _lines(path, suffixes[-1]))
+    gc.freeze()  # its records stay: looking through them for garbage again and again holds the mapping up
+    return log
 
 
 def _lines(path: Path, suffix: str) -> list[str]:
