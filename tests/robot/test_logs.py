@@ -1,3 +1,4 @@
+import gc
 import gzip
 import lzma
 import math
@@ -29,6 +30,11 @@ def test_stamps_survive_to_the_microsecond(tmp_path):
     stamps = ["976052857.337530", "1031745824.000001", "70.289900"]
     log = open_log(written(tmp_path, *(flaser([1.0] * 180, stamp=s) for s in stamps)))
     assert [f"{scan.stamp_s:.6f}" for _, scan in log] == stamps
+
+
+def test_a_log_in_memory_is_not_searched_for_garbage_while_it_is_mapped(tmp_path):
+    log = open_log(written(tmp_path, flaser([1.0] * 180)))
+    assert all(each is not log for each in gc.get_objects())
 
 
 def test_odometry_is_the_robot_pose_inside_the_laser_line(tmp_path):

@@ -3,6 +3,7 @@ import pytest
 
 from lemtomap.se2 import between, compose, inverse, pose, transform
 from lemtomap.topo.align import HitMap, MatchConfig, match_place
+from lemtomap.topo.align.gathering import kernels as gathering
 from lemtomap.topo.place import decode_place, encode_place
 from lemtomap.types import GridView
 from tests.lemtomap.topo.test_place import office
@@ -95,6 +96,22 @@ def test_the_hit_map_forgets_what_lies_a_map_size_behind():
     for k in range(3):
         hits.add(pose(24.0 + 0.2 * k, 0, 0), transform(inverse(pose(24.0 + 0.2 * k, 0, 0)), far))
     assert len(hits.around((0.0, 0.0), 6.0, grid, 50)) == 0
+
+
+def test_cells_hit_too_long_ago_are_given_back_and_start_anew():
+    """Never given back they were passed over one by one at every node, in time most of the ring."""
+    owner, taken = np.full((480, 480, 2), np.iinfo(np.int32).min, np.int32), np.zeros((480, 480), np.int8)
+    ring, wall, at = (owner, taken, np.zeros((480, 480, 6))), office(), pose(0, 0, 0)
+    window = (window_of(wall).occupancy, 0.05, *window_of(wall).origin_m, 50)
+    for now_m in (0.0, 0.2, 0.4):
+        gathering.add_hits(wall, at, 0.05, *ring, now_m, 10.0)
+    assert len(gathering.collect_hits(*ring, 0.05, 0.0, 0.0, 6.0, 2.0, 0.1, *window)) > 300
+    assert taken.sum() > 300
+    assert len(gathering.collect_hits(*ring, 0.05, 0.0, 0.0, 6.0, 2.0, 2.0, *window)) == 0
+    assert taken.sum() == 0
+    gathering.add_hits(wall[:1], at, 0.05, *ring, 12.0, 10.0)
+    assert taken.sum() == 1
+    assert ring[2][taken > 0][0, 2] == 1.0
 
 
 def test_hits_the_window_no_longer_believes_are_left_out():

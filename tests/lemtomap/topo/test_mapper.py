@@ -3,7 +3,9 @@ import pytest
 
 from lemtomap.se2 import between, compose, pose
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.protocols import NotStarted
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
@@ -139,3 +141,15 @@ def test_poses_in_the_view_agree_with_the_edges(mapper):
     for edge in mapper.store.edges():
         seen = between(view.T_grid_node[edge.source_id], view.T_grid_node[edge.target_id])
         np.testing.assert_allclose(seen, edge.T_source_target, atol=1e-9)
+
+
+def test_the_nearest_node_that_is_surely_predicted_is_looked_for_in_the_window(tmp_path):
+    with TopoStore.create(tmp_path / "map.lemto") as store:
+        local = LocalMap(PagedGraph(store), TopoConfig())
+        for node_id, (x_m, sigma_m, anchored) in enumerate(
+            [(0.5, 0.01, True), (1.0, 0.5, False), (2.0, 0.1, False), (2.5, 0.01, False)], start=1
+        ):
+            covariance = np.eye(3) * sigma_m**2
+            local.standings[node_id] = Standing(np.array([x_m, 0.0, 0.0]), covariance, anchored=anchored)
+        assert local.predicted_near(np.zeros(3), 3.0, 0.2) == 3
+        assert local.predicted_near(np.zeros(3), 1.9, 0.2) == 0
