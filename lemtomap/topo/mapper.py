@@ -178,8 +178,8 @@ class TopoMapper:
         return nearest_id
 
     def _distance_m(self, node_id: int) -> float:
-        at, node = self._require().slam.T_grid_base, self._pose_of(node_id)
-        return math.hypot(node[0] - at[0], node[1] - at[1])
+        x, y, _ = (self._pose_of(node_id) - self._require().slam.T_grid_base).tolist()
+        return math.hypot(x, y)
 
     def _sees(self, node_id: int) -> bool:
         now = self._require()
@@ -268,9 +268,7 @@ class TopoMapper:
 
     def _take_places(self) -> None:
         now = self._require()
-        slam = now.slam
-        taken = self.keeper.take_ripe(self.local, slam.T_grid_base, now.grid, slam.stamp_s)
-        self._tell(taken)
+        self._tell(self.keeper.take_ripe(self.local, now.slam.T_grid_base, now.grid, now.slam.stamp_s))
 
     def _tell(self, taken: list[Taken]) -> None:
         if self._recogniser is not None:
