@@ -53,6 +53,9 @@ class _Known(NamedTuple):
     sums: tuple[float, ...]
 
 
+_START = _Known(0.0, 0.0, 0.0, 0.0, 0, 0, (0.0,) * 7)
+
+
 class Outlook:
     """Expected poses of the nodes around one anchor node, found a slice at a time, surest first."""
 
@@ -61,8 +64,8 @@ class Outlook:
         self._graph = graph
         self._config = config
         self._known: dict[int, _Known] = {}
-        start = _Known(0.0, 0.0, 0.0, 0.0, 0, 0, (0.0,) * 7)
-        self._queue: list[tuple[float, int, int, _Known]] = [(0.0, 0, anchor_id, start)]
+        self._queue: list[tuple[float, int, int, int, Leg | None]] = [(0.0, 0, anchor_id, 0, None)]
+        """Doubt of the way, running number, node, the node before it and the edge from there."""
         self._pushed = 0
         self._ids: list[int] = []
         self._rows = np.empty((64, 11))
@@ -81,24 +84,25 @@ class Outlook:
     def advance(self, nodes: int) -> bool:
         """Reach up to `nodes` more; return True when done."""
         while nodes > 0 and self._queue and len(self._known) < self._config.outlook_nodes:
-            cost, _, node_id, known = heapq.heappop(self._queue)
+            cost, _, node_id, via_id, leg = heapq.heappop(self._queue)
             if node_id not in self._known:
                 nodes -= 1
+                known = _START if leg is None else self._after(self._known[via_id], leg, via_id)
                 self._settle(node_id, known, cost)
         return self.done
 
     def extend(self, node_id: int) -> None:
         """Reach a node made since the outlook began, over its surest edge to a node already reached."""
         ways = [
-            self._step(self._known[leg.other_id], back, leg.other_id)
+            (self._doubt(back), leg.other_id, back)
             for leg in self._graph.legs_of(node_id)
             if leg.other_id in self._known
             for back in self._graph.legs_of(leg.other_id)
             if back.other_id == node_id
         ]
         if ways:
-            cost, known = min(ways, key=lambda way: way[0])
-            self._settle(node_id, known, cost)
+            doubt, via_id, back = min(ways, key=lambda way: way[0])
+            self._settle(node_id, self._after(self._known[via_id], back, via_id), doubt)
 
     def _settle(self, node_id: int, known: _Known, cost: float) -> None:
         self._known[node_id] = known
@@ -109,15 +113,22 @@ class Outlook:
         for leg in self._graph.legs_of(node_id):
             if leg.other_id not in self._known:
                 self._pushed += 1
-                step_cost, after = self._step(known, leg, node_id)
-                heapq.heappush(self._queue, (cost + step_cost, self._pushed, leg.other_id, after))
+                doubt = cost + self._doubt(leg)
+                heapq.heappush(self._queue, (doubt, self._pushed, leg.other_id, node_id, leg))
 
-    def _step(self, known: _Known, leg: Leg, node_id: int) -> tuple[float, _Known]:
-        """Return what crossing an edge costs (doubt, so that well measured ways win) and where it leads."""
-        _, _, dx, dy, turn, length, shift_var, turn_var = leg
-        config = self._config
-        shift_var += config.shift_var_per_m * length
-        turn_var += config.turn_var_per_m * length
+    def _doubt(self, leg: Leg) -> float:
+        """Return what crossing an edge costs: well measured ways win."""
+        shift_var, turn_var = self._variances(leg)
+        return shift_var + self._config.arm_m**2 * turn_var
+
+    def _variances(self, leg: Leg) -> tuple[float, float]:
+        config, (_, _, _, _, _, length, shift_var, turn_var) = self._config, leg
+        return shift_var + config.shift_var_per_m * length, turn_var + config.turn_var_per_m * length
+
+    def _after(self, known: _Known, leg: Leg, node_id: int) -> _Known:
+        """Return where an edge from a node reached leads."""
+        _, _, dx, dy, turn, length, _, _ = leg
+        shift_var, turn_var = self._variances(leg)
         c, s = cos(known.yaw_rad), sin(known.yaw_rad)
         x, y = known.x_m + c * dx - s * dy, known.y_m + s * dx + c * dy
         mx, my = 0.5 * (x + known.x_m), 0.5 * (y + known.y_m)
@@ -131,8 +142,7 @@ class Outlook:
             before[TURN_XY] + turn_var * mx * my,
             before[TURN_YY] + turn_var * my * my,
         )
-        after = _Known(x, y, known.yaw_rad + turn, known.way_m + length, node_id, known.depth + 1, sums)
-        return shift_var + config.arm_m**2 * turn_var, after
+        return _Known(x, y, known.yaw_rad + turn, known.way_m + length, node_id, known.depth + 1, sums)
 
     def pose(self, node_id: int) -> Pose | None:
         """Return T_anchor_node; None while a node is not reached."""
