@@ -114,6 +114,8 @@ class RouteEdge:
     """Expected traversal time: learnt where driven, else length over a usual speed."""
     blocked_until_s: float = 0.0
     """The edge is closed to planning while now_s is below this."""
+    proven: bool = True
+    """False: a closure that nobody has driven. It says where a place is; a wall may stand between."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +128,8 @@ class EdgeTable:
     length_m: NDArray[np.float32]
     time_s: NDArray[np.float32]
     blocked_until_s: NDArray[np.float64]
+    proven: NDArray[np.bool_] | None = None
+    """None: all are."""
 
 
 class RouteGraph(Protocol):

@@ -190,6 +190,7 @@ class Navigator:
         shut_at = self._way.check(goal, found.target, found.plan, found.reach, moment)
         if shut_at is not None:
             self.surroundings.hold(shut_at, moment.now_s + self.config.recovery.block_s)
+        if self._way.route is None:
             self._start_over(moment.now_s)
 
     def _start_over(self, now_s: float) -> None:

@@ -71,7 +71,8 @@ class WayKeeper:
     ) -> tuple[float, float] | None:
         """Open edges seen to be free; close those a standing barrier cuts, once it is to be believed.
 
-        Returns where that barrier stands, in the grid frame; the route is then to be planned anew.
+        The route is then None, to be planned anew. Returns where a barrier that may go again stands, in the
+        grid frame; what stands on a closure nobody has driven is mostly a wall.
         """
         self.reopen(reach, moment)
         route, places = self.route, moment.map_view.T_grid_node
@@ -87,6 +88,9 @@ class WayKeeper:
             return None
         away_m = float(np.hypot(*(np.array(barrier.p_near_grid) - moment.T_grid_base[:2])))
         near = away_m < NEAR_BARRIER_M or target is None
+        if not route.edges[barrier.index].proven and not self.barriers.moving(barrier):
+            self._rule_out(route, barrier.index, moment)
+            return None
         if not self.barriers.closed(barrier, moment.now_s, near=near):
             return None
         on_route = (barrier.edge_id, route.nodes[barrier.index], route.nodes[barrier.index + 1])
@@ -113,6 +117,14 @@ class WayKeeper:
             return False
         self._close([(route.edges[0].edge_id, route.nodes[0], route.nodes[1])], moment)
         return True
+
+    def _rule_out(self, route: Route, index: int, moment: Moment) -> None:
+        """Close a closure that the window shows to lead through something: it never was a way."""
+        edge_id, until_s = route.edges[index].edge_id, moment.now_s + self._config.recovery.block_longest_s
+        self._closed_s[edge_id] = until_s
+        moment.events.append(EdgeBlocked(route.nodes[index], route.nodes[index + 1], until_s))
+        self.route = None
+        self.barriers.reset()
 
     def _close(self, links: Sequence[Link], moment: Moment) -> None:
         """Plan around these edges from now on, and tell the map."""

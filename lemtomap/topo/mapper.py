@@ -11,12 +11,12 @@ from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.doubt import COVARIANCE_FLOOR, NOWHERE, relative_to_window
 from lemtomap.topo.events import NavEvent, NothingKnownHere
-from lemtomap.topo.graph import Covariance, Edge, chain_covariance
+from lemtomap.topo.graph import USUAL_SPEED_MPS, Covariance, Edge, chain_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
 from lemtomap.topo.levels import Lift, put_on_level
 from lemtomap.topo.local import LocalMap, Standing
-from lemtomap.topo.neighbours import NeighbourFinder, in_sight
+from lemtomap.topo.neighbours import NeighbourFinder, directly_navigable, in_sight
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.protocols import NotStarted, Recogniser, Transform
 from lemtomap.topo.snapshots import Snapshots
@@ -286,15 +286,18 @@ class TopoMapper:
     ) -> Edge:
         """Commit a closure between two nodes, of one component or two; returns the edge, for revoke.
 
-        When the source stands in this window, the target now does too.
+        When the source stands in this window, the target now does too; where the window shows the line
+        between them free, the robot can go straight there, as on a near-neighbour edge.
         """
         edge = Edge(0, source_id, target_id, np.array(T_source_target), covariance, EdgeType.LOOP_CLOSING)
-        edge = self.graph.add_edge(edge)
         source = self.local.standings.get(source_id)
         if source is not None and source.anchored:
             T_grid_target = compose(source.T_grid_node, T_source_target)
             joined = chain_covariance(source.covariance, edge.T_source_target, covariance)
             self.local.anchor(target_id, T_grid_target, joined)
+            if directly_navigable(self._require().grid, source.T_grid_node, T_grid_target, self.config):
+                edge = replace(edge, time_s=edge.length_m / USUAL_SPEED_MPS)
+        edge = self.graph.add_edge(edge)
         self.local.settle(self._associated_id)
         return edge
 

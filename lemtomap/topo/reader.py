@@ -19,6 +19,7 @@ _NEIGHBOURS = (
 _ALL_EDGES = "SELECT id, source, target, time, blocked, measure, type FROM edge"
 _EDGES_AT = _ALL_EDGES + " WHERE source = ?1 OR target = ?1"
 _DETOURS = np.array([detour(kind) for kind in sorted(EdgeType, key=type_code)])  # by the file's type code
+_CLOSURE = type_code(EdgeType.LOOP_CLOSING)
 _MEASURE = np.dtype(
     {"names": ["x", "y"], "formats": ["<f8", "<f8"], "offsets": [0, 8], "itemsize": MEASURE.size}
 )
@@ -84,7 +85,8 @@ class TopoReader:
         for edge_id, other_id, time_s, blocked_s, measure, code in rows:
             length_m = planar_length_m(measure)
             expected_s = length_m / USUAL_SPEED_MPS * _DETOURS[code] if time_s is None else time_s
-            edges.append(RouteEdge(edge_id, other_id, length_m, expected_s, blocked_s or 0.0))
+            proven = time_s is not None or code != _CLOSURE
+            edges.append(RouteEdge(edge_id, other_id, length_m, expected_s, blocked_s or 0.0, proven))
         return tuple(edges)
 
     def node_count(self) -> int:
@@ -160,4 +162,5 @@ def _table(rows: Sequence[tuple[Any, ...]]) -> EdgeTable:
         length_m=length_m.astype(np.float32),
         time_s=np.where(np.isnan(learnt_s), straight_s, learnt_s).astype(np.float32),
         blocked_until_s=np.nan_to_num(np.array(blocked, dtype=np.float64)),
+        proven=~np.isnan(learnt_s) | (np.array(code, dtype=np.intp) != _CLOSURE),
     )

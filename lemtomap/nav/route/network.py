@@ -38,6 +38,7 @@ class RouteNetwork:
         self._open_price = np.full(_room(count), np.inf, dtype=np.float32)
         self._price = np.full(_room(count), np.inf, dtype=np.float32)
         """As open prices, but inf where closed: kept up to date, for there may be millions."""
+        self._proven = np.ones(_room(count), dtype=bool)
         self._chained = np.zeros(_room(count), dtype=bool)
         self._blocked_s: dict[int, float] = {}
         """Edges the map holds closed, and until when."""
@@ -61,6 +62,9 @@ class RouteNetwork:
         new = ~self._chained[ids]
         share, usual_mps = self._config.learnt_weight, self._config.usual_speed_mps
         price = share * edges.time_s + (1.0 - share) * edges.length_m / usual_mps
+        if edges.proven is not None:
+            price = price + self._config.unproven_s * ~edges.proven
+        self._proven[ids] = True if edges.proven is None else edges.proven
         self._length_m[ids], self._time_s[ids] = edges.length_m, edges.time_s
         self._open_price[ids] = np.maximum(price, 1e-3)
         self._note_blocked(edges)
@@ -180,6 +184,7 @@ class RouteNetwork:
                 float(self._length_m[arc >> 1]),
                 float(self._time_s[arc >> 1]),
                 self._blocked_s.get(arc >> 1, 0.0),
+                bool(self._proven[arc >> 1]),
             )
             for arc in arcs
         )
@@ -202,6 +207,7 @@ class RouteNetwork:
             self._time_s = _grown(self._time_s, size, 0.0)
             self._open_price = _grown(self._open_price, size, np.inf)
             self._price = _grown(self._price, size, np.inf)
+            self._proven = _grown(self._proven, size, fill=True)
             self._chained = _grown(self._chained, size, 0)
 
 

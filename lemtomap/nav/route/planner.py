@@ -34,9 +34,12 @@ class Route:
 
 
 def edge_cost_s(edge: RouteEdge, config: RouteConfig) -> float:
-    """Mix learnt traversal time with length over usual speed."""
-    return config.learnt_weight * edge.time_s + (1.0 - config.learnt_weight) * (
-        edge.length_m / config.usual_speed_mps
+    """Mix learnt traversal time with length over usual speed; what may be no way at all is a last resort."""
+    doubt_s = 0.0 if edge.proven else config.unproven_s
+    return (
+        doubt_s
+        + config.learnt_weight * edge.time_s
+        + (1.0 - config.learnt_weight) * (edge.length_m / config.usual_speed_mps)
     )
 
 

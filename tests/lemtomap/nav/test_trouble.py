@@ -1,6 +1,7 @@
 """What the navigator does when the world changes or does not let it pass."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -75,6 +76,37 @@ def test_refuses_with_the_reason_when_no_way_is_left():
     assert "closed" in outputs[-1].text
     assert world.contacts == 0
     assert run(world, navigator, 3, 30.0)[-1].state == NavState.ARRIVED
+
+
+def close_through_walls(world) -> None:
+    """Join nodes on either side of the long wall by closures, as recognising a place through a door does."""
+    closures = {900: (3, 11), 901: (4, 13), 902: (5, 9), 903: (5, 8)}
+    world.graph.links += [(edge_id, a, b) for edge_id, (a, b) in closures.items()]
+    world.graph.unproven |= set(closures)
+
+
+def test_takes_the_way_it_knows_before_a_closure_through_a_wall():
+    world = two_rooms()
+    close_through_walls(world)
+    world.pose[:2] = (4.0, 1.0)
+    shut(world, 6.55, 7.45)
+    outputs = run(world, Navigator(), 8, 90.0)
+    assert outputs[-1].state == NavState.ARRIVED
+    steps = {frozenset(pair) for o in outputs for pair in pairwise(o.route)}
+    assert not steps & {frozenset((a, b)) for e, a, b in world.graph.links if e in world.graph.unproven}
+
+
+def test_a_closure_that_proves_to_lead_through_a_wall_is_not_waited_at():
+    world = two_rooms()
+    close_through_walls(world)
+    world.graph.links = [link for link in world.graph.links if set(link[1:]) not in ({6, 7}, {9, 13})]
+    world.pose[:2] = (4.0, 1.0)
+    shut(world, 6.55, 7.45)
+    world.box(4.5, 4.3, 4.65, 5.3)
+    outputs = run(world, Navigator(), 8, 60.0)
+    assert outputs[-1].state == NavState.FAILED
+    assert "closed" in outputs[-1].text
+    assert len(outputs) * 0.1 < 3.0
 
 
 def test_waits_politely_for_somebody_in_the_doorway():

@@ -23,6 +23,8 @@ class Graph:
     links: list[tuple[int, int, int]] = field(default_factory=list)
     """(edge id, a, b)"""
     blocked_s: dict[int, float] = field(default_factory=dict)
+    unproven: set[int] = field(default_factory=set)
+    """Ids of edges that are closures nobody has driven."""
     version: int = 1
 
     @classmethod
@@ -41,9 +43,8 @@ class Graph:
             if node_id in (a, b):
                 length = self.length(a, b)
                 other = b if node_id == a else a
-                found.append(
-                    RouteEdge(edge_id, other, length, length / 0.4, self.blocked_s.get(edge_id, 0.0))
-                )
+                proven, blocked_s = edge_id not in self.unproven, self.blocked_s.get(edge_id, 0.0)
+                found.append(RouteEdge(edge_id, other, length, length / 0.4, blocked_s, proven))
         return found
 
 

@@ -41,6 +41,17 @@ def test_a_round_longer_than_d_nn_stays_open_until_a_closure_joins_it(loop):
         assert 1 in {each.other_id for each in reader.edges_of(last)}
 
 
+@pytest.mark.parametrize(("walls", "proven"), [((), True), ([(-9.5, -8.7, -8.5, -8.6)], False)])
+def test_a_closure_is_a_way_at_once_where_the_window_shows_its_line_free(loop, walls, proven):
+    last = loop.associated_id
+    loop.update(said(1e4, loop.local.standings[last].T_grid_node), room(40.0, walls=walls))
+    edge = loop.close_loop(last, 1, between(loop.local.standings[last].T_grid_node, pose(-9, -9, 0)), SURE)
+    assert (edge.time_s is not None) is proven
+    loop.store.commit()
+    with TopoReader(loop.store.path) as reader:
+        assert next(each.proven for each in reader.edges_of(last) if each.edge_id == edge.edge_id) is proven
+
+
 def test_from_whatever_frame_the_map_is_seen_its_nodes_lie_the_same_way(loop):
     """Also where edges contradict one another, so that the local solve has work to do."""
     last = loop.associated_id

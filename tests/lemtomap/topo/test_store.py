@@ -272,23 +272,26 @@ def test_a_reader_follows_the_writer_and_forgets_only_what_changed(tmp_path):
 
 
 def test_an_undriven_closure_is_no_short_cut_until_someone_has_driven_it(tmp_path):
-    """A closure may pass through a wall: it is dearer than a way round of up to several times its length."""
+    """A closure may pass through a wall: it is dearer than a way of many times its length that is known."""
     path = tmp_path / "a.lemto"
     with TopoStore.create(path) as store:
-        for _ in range(4):
+        for _ in range(16):
             store.add_node()
-        for a in (1, 2, 3):
-            store.add_edge(an_edge(a, a + 1))
+        for a in (1, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15):
+            store.add_edge(an_edge(a, 5 if a == 1 else a + 1))
+        store.add_edge(an_edge(16, 4))
         closure = store.add_edge(an_edge(1, 4, type=EdgeType.LOOP_CLOSING))
         store.commit()
         with TopoReader(path) as reader:
             network = RouteNetwork(reader.edge_table(), RouteConfig())
-            assert network.plan(1, 4, 0.0).nodes == (1, 2, 3, 4)
+            assert network.plan(1, 4, 0.0).nodes == (1, *range(5, 17), 4)
+            assert [edge.proven for edge in reader.edges_of(1)] == [True, False]
             assert max(edge.time_s for edge in reader.edges_of(1)) == closure.expected_time_s
             store.put_edge(replace(closure, time_s=2.5))
             store.commit()
             network = RouteNetwork(reader.edge_table(), RouteConfig())
             assert network.plan(1, 4, 0.0).nodes == (1, 4)
+            assert network.plan(1, 4, 0.0).edges[0].proven
 
 
 WRITER = """
