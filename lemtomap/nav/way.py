@@ -140,8 +140,12 @@ class WayKeeper:
     def _block_s(self, edge_id: int, now_s: float) -> float:
         """Return how long an edge is to be closed: each time longer, else two closed ways that open again
         while the robot is at the other one send it to and fro for ever.
+
+        Found cut while it is closed, it was not closed again: one barrier is met from several edges.
         """
         recovery = self._config.recovery
         before, _ = self._closings.get(edge_id, (0, now_s))
+        if before and self._closed_s.get(edge_id, 0.0) > now_s:
+            before -= 1
         self._closings[edge_id] = (before + 1, now_s)
         return min(recovery.block_s * recovery.block_growth**before, recovery.block_longest_s)

@@ -8,8 +8,11 @@ import pytest
 
 from lemtomap.nav.config import NavConfig, RecoveryConfig
 from lemtomap.nav.navigator import Navigator
-from lemtomap.nav.types import NavState, Reason, Sighting
+from lemtomap.nav.route.planner import Route
+from lemtomap.nav.types import Goal, NavState, Reason, Sighting
+from lemtomap.nav.way import Moment, WayKeeper
 from lemtomap.topo.events import Bumped, EdgeBlocked
+from lemtomap.types import RouteEdge, Twist
 from tests.lemtomap.nav.test_navigator import two_rooms
 from tests.lemtomap.nav.world import run
 
@@ -45,6 +48,21 @@ def test_uses_a_door_again_that_opens():
     outputs = run(world, navigator, 6, 60.0)
     assert outputs[-1].state == NavState.ARRIVED
     assert len(outputs) * 0.1 < 15.0, "took the long way though the door stood open in plain sight"
+
+
+def test_an_edge_found_cut_while_it_is_closed_is_not_closed_for_longer():
+    """Three edges through one doorway, tried one after another, made 30 minutes of the first one's minute."""
+    keeper, edge = WayKeeper(NavConfig()), RouteEdge(9, 2, 1.0, 2.5)
+    world = two_rooms()
+    spans_s = []
+    for now_s in (0.0, 3.0, 6.0, 70.0):
+        keeper.keep(Goal(1), Moment(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s))
+        keeper.route = Route((1, 2), (edge,), 2.5)
+        moment = Moment(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s)
+        assert keeper.close_next(moment)
+        spans_s += [event.until_s - now_s for event in moment.events if isinstance(event, EdgeBlocked)]
+    block_s = RecoveryConfig().block_s
+    assert spans_s == [block_s, block_s, block_s, RecoveryConfig().block_growth * block_s]
 
 
 def test_two_ways_that_are_shut_by_turns_do_not_send_it_to_and_fro_for_ever():
