@@ -25,7 +25,8 @@ from sim.route import RoutePlanner
 from sim.world import Box, Pose2, Raster, Surface
 from tools.nav_lead import Rig, rig_of, round_trip
 
-BARRIER = Box((0.0, 0.0, 0.6), (0.04, 1.3, 0.6))
+DOOR_HALF_M = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3)
+"""Half the width of the doors there are. One that stuck out behind the walls would be a new thing there."""
 BAR = Box((0.0, 0.0, 0.09), (0.03, 0.30, 0.03), surface=Surface.DARK)
 IN_SIGHT_M = 3.0
 LIMIT_S = 400.0
@@ -118,14 +119,42 @@ def across(path: NDArray[np.float64], share: float) -> Pose2:
     return float(path[at, 0]), float(path[at, 1]), math.atan2(dy, dx)
 
 
-def barred(raster: Raster, pose: Pose2) -> Raster:
-    """Return the plan with the barrier in it."""
+class Doors:
+    """A door of each width; at most one of them is shut."""
+
+    def __init__(self) -> None:
+        self.all = [Placed((Box((0.0, 0.0, 0.6), (0.04, half_m, 0.6)),)) for half_m in DOOR_HALF_M]
+
+    def shut(self, door: int, pose: Pose2) -> None:
+        """Shut one, open the others."""
+        for index, placed in enumerate(self.all):
+            placed.pose = pose if index == door else NOWHERE
+
+    def open(self) -> None:
+        """Open all."""
+        self.shut(-1, NOWHERE)
+
+
+def fitting_door(raster: Raster, pose: Pose2) -> tuple[int, Pose2] | None:
+    """Return the narrowest door that shuts the way at a pose, and where in its middle; None if none does."""
+    x, y, yaw = pose
+    left_m, right_m = (_room(raster, x, y, yaw + sign * math.pi / 2) for sign in (1, -1))
+    aside_m = 0.5 * (left_m - right_m)
+    middle = x - aside_m * math.sin(yaw), y + aside_m * math.cos(yaw), yaw
+    for index, half_m in enumerate(DOOR_HALF_M):
+        if half_m >= 0.5 * (left_m + right_m):
+            return index, middle
+    return None
+
+
+def barred(raster: Raster, pose: Pose2, half_m: float) -> Raster:
+    """Return the plan with a door in it."""
     rows, cols = np.indices(raster.occupied.shape)
     x = raster.origin_m[0] + (cols + 0.5) * raster.resolution_m - pose[0]
     y = raster.origin_m[1] + (rows + 0.5) * raster.resolution_m - pose[1]
     along = x * math.cos(pose[2]) + y * math.sin(pose[2])
     aside = -x * math.sin(pose[2]) + y * math.cos(pose[2])
-    wall = (abs(along) <= 0.08) & (abs(aside) <= BARRIER.half[1])
+    wall = (abs(along) <= 0.08) & (abs(aside) <= half_m + raster.resolution_m)
     return replace(raster, occupied=raster.occupied | wall, free=raster.free & ~wall)
 
 
@@ -141,17 +170,17 @@ def length_m(planner: RoutePlanner, a: Point, b: Point) -> float:
 def bench_doors(name: str, seed: int, count: int) -> None:
     """Close the way `count` times; print each drive and how many did what they should."""
     warm_up(RobotConfig())
-    world, barrier = worlds.load(name), Placed((BARRIER,))
+    world, doors = worlds.load(name), Doors()
     rng = np.random.default_rng(seed)
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
-        rig = rig_of(replace(world, movers=(*world.movers, barrier)), seed, Path(folder))
+        rig = rig_of(replace(world, movers=(*world.movers, *doors.all)), seed, Path(folder))
         rig.lead(round_trip(world))
         planner = RoutePlanner(world.raster)
         for _ in range(50 * count):
             if len(rows) >= 2 * count:
                 break
-            rows += _one_door(rig, barrier, planner, int(rng.choice(sorted(rig.T_world_node))))
+            rows += _one_door(rig, doors, planner, int(rng.choice(sorted(rig.T_world_node))))
         rig.close()
     for kind in ("another way", "again", "refused"):
         mine = [row for row in rows if row[0] == kind]
@@ -160,9 +189,7 @@ def bench_doors(name: str, seed: int, count: int) -> None:
         print(f"{kind:12} {right} of {len(mine)} right; s: " + ", ".join(f"{time_s:.1f}" for time_s in times))
 
 
-def _one_door(
-    rig: Rig, barrier: Placed, planner: RoutePlanner, node_id: int
-) -> list[tuple[str, bool, float]]:
+def _one_door(rig: Rig, doors: Doors, planner: RoutePlanner, node_id: int) -> list[tuple[str, bool, float]]:
     """Bar the way to one node; return (what, right, time s) of each drive."""
     here = rig.simulator.truth().T_world_base
     there = rig.T_world_node[node_id]
@@ -170,11 +197,15 @@ def _one_door(
     short_m = float(np.hypot(*np.diff(path, axis=0).T).sum())
     if not LEAST_WAY_M < short_m < MOST_WAY_M:
         return []
-    pose = across(path, 0.6)
-    long_m = length_m(RoutePlanner(barred(rig.simulator.world.raster, pose)), here, there)
+    raster = rig.simulator.world.raster
+    fitting = fitting_door(raster, across(path, 0.6))
+    if fitting is None:
+        return []
+    door, pose = fitting
+    long_m = length_m(RoutePlanner(barred(raster, pose, DOOR_HALF_M[door])), here, there)
     if long_m < 1.5 * short_m + 3.0 or (math.isfinite(long_m) and long_m > 100.0):
         return []  # the barrier is no barrier, or the way round is too long for a bench
-    barrier.pose = pose
+    doors.shut(door, pose)
     print(f"node {node_id}: {short_m:.0f} m, barred {long_m:.0f} m", flush=True)
     drive = Drive(rig, Goal(node_id), pose).run()
     print(f"  barred: {drive.told()}", flush=True)
@@ -182,11 +213,11 @@ def _one_door(
         right = drive.state == "failed" and "closed" in drive.text
         again = Drive(rig, Goal(node_id), pose).run()
         print(f"  asked again: {again.told()}", flush=True)
-        barrier.pose = NOWHERE
+        doors.open()
         return [("refused", right and again.state == "failed", again.ended_s - again.begun_s)]
     found_s = drive.closed_s - drive.seen_s
     rows = [("another way", drive.state == "arrived" and found_s < 5.0, found_s)]
-    barrier.pose = NOWHERE
+    doors.open()
     back = rig.nearest_node(here)
     home = Drive(rig, Goal(back)).run()
     wait_s = rig.core.navigation.navigator.config.recovery.block_s
