@@ -22,6 +22,8 @@ MEMORY_S = 0.8
 MOVED_M = 0.10
 """... if it was elsewhere by this much: more than the noise of a URG-04LX."""
 MOVED_HITS = 4
+SEEN_M = 0.2
+"""A hit this near to a barrier's middle shows that it still stands there; a door's posts are further off."""
 SAME_BARRIER_M = 0.8
 """Obstacles on two edges this near to one another are one door, one chair, one person."""
 
@@ -57,6 +59,8 @@ class BarrierWatch:
     def __init__(self, config: RecoveryConfig) -> None:
         self._config = config
         self._edge_id: int | None = None
+        self._met = False
+        """True: the sensors have hit the barrier under suspicion, or the robot stands before it."""
         self._first_s = 0.0
         self._still_s = 0.0
         self._past: deque[tuple[float, Points]] = deque()
@@ -80,16 +84,23 @@ class BarrierWatch:
         """Take the barrier seen now; True once it is to be treated as closed.
 
         near: the robot stands before it; only then does waiting for something that moves run out.
+        From afar only what the sensors have hit since is believed: the window remembers doors that opened.
         """
         if barrier.edge_id != self._edge_id:
             self._edge_id, self._first_s, self._still_s = barrier.edge_id, now_s, now_s
-        if self.moving(barrier):
+            self._met = False
+        self._met = self._met or near or self._seen(barrier)
+        if self.moving(barrier) or not self._met:
             self._still_s = now_s
         if not near:
             self._first_s = now_s
         if now_s - self._still_s >= self._config.closed_after_s:
             return True
         return near and now_s - self._first_s >= self._config.polite_wait_s
+
+    def _seen(self, barrier: Barrier) -> bool:
+        """Tell whether the newest hits show something at the barrier."""
+        return bool(self._past) and bool(len(_around(self._past[-1][1], barrier, SEEN_M)))
 
     def moving(self, barrier: Barrier) -> bool:
         """Tell whether around the barrier something is hit where nothing was hit a moment ago."""

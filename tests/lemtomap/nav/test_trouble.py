@@ -65,6 +65,26 @@ def test_an_edge_found_cut_while_it_is_closed_is_not_closed_for_longer():
     assert spans_s == [block_s, block_s, block_s, RecoveryConfig().block_growth * block_s]
 
 
+def test_a_door_only_remembered_shut_is_looked_at_before_another_way_is_taken():
+    """The window learns that a door has opened when the robot looks at it, and some scans later."""
+    world = two_rooms()
+    world.pose[:] = (2.6, 1.0, np.pi)
+    shut(world, 1.75, 2.65)
+    shut(world, 6.55, 7.45)
+    view = world.view
+
+    def door(w):
+        if w.pose[0] > 4.0:
+            w.view = view
+
+    remembered = world.view().grid
+    world.box(6.55, 2.0, 7.45, 2.15, value=False)
+    world.view = lambda associated_id=None: replace(view(associated_id), grid=remembered)
+    outputs = run(world, Navigator(), 8, 60.0, door)
+    assert outputs[-1].state == NavState.ARRIVED
+    assert not any(isinstance(e, EdgeBlocked) for o in outputs for e in o.events)
+
+
 def test_two_ways_that_are_shut_by_turns_do_not_send_it_to_and_fro_for_ever():
     """Each is seen to be shut only from near by, and counts as open again while the robot is at the other."""
     world = two_rooms()
