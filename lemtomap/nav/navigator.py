@@ -125,6 +125,8 @@ class Navigator:
         self._command = output.twist
         driving = output.state in {NavState.DRIVING, NavState.TURNING}
         traversed = self._edge_clock.step(map_view.associated_id, graph, now_s, driving=driving)
+        if traversed is not None:
+            self._way.passed(traversed, graph)
         events = (*moment.events, *((traversed,) if traversed else ()))
         return replace(output, events=events, cycle=self._cycle)
 

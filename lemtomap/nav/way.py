@@ -14,7 +14,7 @@ from lemtomap.nav.sliding import BORDER_M, Target
 from lemtomap.nav.types import Goal
 from lemtomap.nav.watching import BarrierWatch, Link, links_cut, links_open_again
 from lemtomap.se2 import Pose
-from lemtomap.topo.events import EdgeBlocked, NavEvent
+from lemtomap.topo.events import EdgeBlocked, EdgeTraversed, NavEvent
 from lemtomap.types import MapView, RouteGraph, Twist
 
 NEAR_BARRIER_M = 1.0
@@ -117,6 +117,12 @@ class WayKeeper:
             return False
         self._close([(route.edges[0].edge_id, route.nodes[0], route.nodes[1])], moment)
         return True
+
+    def passed(self, driven: EdgeTraversed, graph: RouteGraph) -> None:
+        """Forget how often an edge was closed: it was open all along its length since."""
+        for edge in graph.edges_of(driven.from_id) if self._closings else ():
+            if edge.other_id == driven.to_id:
+                self._closings.pop(edge.edge_id, None)
 
     def _rule_out(self, route: Route, index: int, moment: Moment) -> None:
         """Close a closure that the window shows to lead through something: it never was a way."""

@@ -11,7 +11,7 @@ from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.types import Goal, NavState, Reason, Sighting
 from lemtomap.nav.way import Moment, WayKeeper
-from lemtomap.topo.events import Bumped, EdgeBlocked
+from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed
 from lemtomap.types import RouteEdge, Twist
 from tests.lemtomap.nav.test_navigator import two_rooms
 from tests.lemtomap.nav.world import run
@@ -55,14 +55,18 @@ def test_an_edge_found_cut_while_it_is_closed_is_not_closed_for_longer():
     keeper, edge = WayKeeper(NavConfig()), RouteEdge(9, 2, 1.0, 2.5)
     world = two_rooms()
     spans_s = []
-    for now_s in (0.0, 3.0, 6.0, 70.0):
+    world.graph.links = [(9, 1, 2)]
+    for now_s in (0.0, 3.0, 6.0, 70.0, 400.0):
         keeper.keep(Goal(1), Moment(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s))
         keeper.route = Route((1, 2), (edge,), 2.5)
         moment = Moment(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s)
         assert keeper.close_next(moment)
         spans_s += [event.until_s - now_s for event in moment.events if isinstance(event, EdgeBlocked)]
+        if now_s == 70.0:
+            keeper.passed(EdgeTraversed(1, 2, 2.5), world.graph)
     block_s = RecoveryConfig().block_s
-    assert spans_s == [block_s, block_s, block_s, RecoveryConfig().block_growth * block_s]
+    assert spans_s[:-1] == [block_s, block_s, block_s, RecoveryConfig().block_growth * block_s]
+    assert spans_s[-1] == block_s, "driven in between, so this is another closing"
 
 
 def test_a_door_only_remembered_shut_is_looked_at_before_another_way_is_taken():
