@@ -17,6 +17,8 @@ JUDGED_M = 0.5
 """Nearer to the window's border than this nothing is said about an opening."""
 UP_TO_M = 0.3
 """An opening's place in the window may be off by this much."""
+AROUND_M = 0.5
+"""So much around an opening must be shown, more of it than not, before a look can settle that it is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +42,15 @@ class Ground:
     def still_open(self, p_grid: ArrayLike) -> bool:
         """Tell whether an opening that was not found again at its place may still lead to unseen ground.
 
-        It does not where the window shows the floor up to it; it may where that has been forgotten.
+        It does not where the window shows the floor up to it; it may where that has been forgotten, or where
+        only a few beams came by: they make a way up to it, but no edge wide enough to be found.
         """
         costs = self.reach.costs
         if not costs.holds(p_grid, JUDGED_M):
             return True
         if self.reach.nearest(p_grid, UP_TO_M) is not None:
-            return False
+            around = AROUND_M / costs.resolution_m
+            return bool(kernels.barely_shown(costs.state, self.large, *costs.cell(p_grid), around))
         return bool(kernels.dark_in_sight(costs.state, self.large, *costs.cell(p_grid), NEAR_CELLS + 2.0))
 
     def walled_off(self, p_grid: ArrayLike, q_grid: ArrayLike) -> bool:

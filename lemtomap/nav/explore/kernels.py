@@ -120,6 +120,29 @@ def dark_in_sight(state: U1, large: U1, row: float, col: float, radius: float) -
 
 
 @njit(nogil=True, cache=True)
+def barely_shown(state: U1, large: U1, row: float, col: float, radius: float) -> bool:
+    """Tell whether of the ground in sight within radius (cells) of a place less is shown than hidden.
+
+    Large unseen patches count as neither, but one must be in sight.
+    """
+    height, width = state.shape
+    dark, shown, hidden = False, 0, 0
+    for r in range(max(0, int(row - radius)), min(height, int(row + radius) + 2)):
+        for c in range(max(0, int(col - radius)), min(width, int(col + radius) + 2)):
+            if (r + 0.5 - row) ** 2 + (c + 0.5 - col) ** 2 > radius * radius:
+                continue
+            if worst_between(state, row, col, r + 0.5, c + 0.5) == LETHAL:
+                continue
+            if large[r, c]:
+                dark = True
+            elif state[r, c] == UNKNOWN:
+                hidden += 1
+            else:
+                shown += 1
+    return dark and hidden > shown
+
+
+@njit(nogil=True, cache=True)
 def label_clusters(mask: U1, label: I4, reach_cells: int) -> int:
     """Number the clusters of marked cells from 1; cells up to reach_cells apart belong together."""
     height, width = mask.shape

@@ -119,3 +119,19 @@ def test_an_opening_that_comes_and_goes_is_left_alone_at_last():
     elsewhere = Opening((3.95, 5.2), 0.0, 1.0)
     openings.match([elsewhere], ground([DARK_ROOM]), NODES, 1, 50.0)
     assert len(openings.of_state(OpeningState.OPEN)) == 1
+
+
+def strips(count: int) -> list[tuple[float, float, float, float]]:
+    """What the window has forgotten between the beams that still reach the edge of the dark room."""
+    return [(2.0, 0.05 + 0.4 * k, 4.0, 0.35 + 0.4 * k) for k in range(count)]
+
+
+def test_is_kept_where_only_a_few_beams_show_the_floor_up_to_it():
+    """From afar a remembered edge is too full of gaps to be found; what lies behind it is still unseen."""
+    openings, number = one_opening()
+    seen = np.ones((120, 120), dtype=np.uint8)
+    seen[:, 80:] = 0
+    barely = ground([DARK_ROOM, *strips(15)], seen=seen)
+    assert barely.reach.nearest(EDGE, 0.3) is not None
+    openings.match([], barely, NODES, 1, 1.0)
+    assert openings.get(number) is not None
