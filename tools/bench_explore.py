@@ -2,15 +2,18 @@
 
     lemtomap bench explore offices:30:1 --seeds 3
     lemtomap bench explore /data/maps/utexas_gdc_3/3.yaml --starts random --out runs/explore
+    lemtomap bench explore offices:30:1 --depth
 
 Runs in lock-step without recording. "Seen" is the share of the floor which the robot's body can reach that a
 beam of its laser passed over, by the simulator's truth. The greedy explorer drives on the true plan to the
 nearest floor it has not seen, looks all round with a noiseless laser of the same reach, and ends at the same
-share. Results are kept: a run already in --out is not run again.
+share. Results are kept: a run already in --out is not run again. Each contact is printed with the height of
+what was touched: chairs' feet lie below the laser, only the depth camera shows them.
 """
 
 import argparse
 import json
+import math
 import tempfile
 import time
 from dataclasses import asdict, dataclass, field, replace
@@ -23,9 +26,11 @@ from robot.build import build_core
 from robot.config import RobotConfig
 from robot.lockstep import run_lockstep
 from robot.missions import parse_mission
+from robot.sim_run import camera_of
 from sim import worlds
+from sim.scene import TOWER_HIGH_M
 from sim.simulator import Simulator
-from sim.world import World
+from sim.world import Box, World
 from tools.floor_seen import Floor, GreedyExplorer, Mask, random_start, reachable_floor, see_scan
 from tools.mapping_runs import table
 
@@ -50,6 +55,10 @@ class Result:
     greedy_m: float = 0.0
     contacts: int = 0
     cpu_s: float = 0.0
+    depth: bool = False
+    """With the depth camera."""
+    touched: list[tuple[float, float, float, float]] = field(default_factory=list)
+    """(time s, x m, y m, top of the nearest thing m) of each contact."""
     grown: list[tuple[float, float, float]] = field(default_factory=list)
     """(time s, path m, share seen) every two minutes."""
 
@@ -69,7 +78,9 @@ class Onlooker:
         self._look_s = self._tell_s = 0.0
 
     def __call__(self, now_s: float) -> None:
-        """Look now and then."""
+        """Look now and then; note each contact."""
+        if self._simulator.truth().contact_count > len(self._result.touched):
+            self._note_contact(now_s)
         scan = self._simulator.last_scan
         if now_s < self._look_s or scan is None:
             return
@@ -84,18 +95,45 @@ class Onlooker:
             self._result.grown.append((round(now_s, 1), round(truth.path_m, 1), round(share, 4)))
             print(f"    {now_s:6.0f} s {truth.path_m:6.0f} m {100 * share:5.1f} % seen", flush=True)
 
+    def _note_contact(self, now_s: float) -> None:
+        """Tell where the robot touched what: below 0.25 m the laser sees nothing."""
+        x, y, _ = self._simulator.truth().T_world_base
+        box = min(self._simulator.world.boxes, key=lambda box: _away_m(box, float(x), float(y)))
+        top_m = box.centre[2] + box.half[2]
+        self._result.touched.append(
+            (round(now_s, 1), round(float(x), 2), round(float(y), 2), round(top_m, 3))
+        )
+        print(f"    {now_s:6.0f} s contact at {x:.2f}, {y:.2f} with what is {top_m:.2f} m high", flush=True)
 
-def explore(world: World, seed: int, duration_s: float, out: Path) -> Result:
+
+def _away_m(box: Box, x: float, y: float) -> float:
+    """Return the level distance from a point to a box that the robot could run into, inf to any other."""
+    if box.centre[2] - box.half[2] >= TOWER_HIGH_M:
+        return math.inf
+    dx, dy = x - box.centre[0], y - box.centre[1]
+    cos, sin = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
+    along, across = abs(cos * dx + sin * dy) - box.half[0], abs(cos * dy - sin * dx) - box.half[1]
+    return math.hypot(max(along, 0.0), max(across, 0.0))
+
+
+def explore(world: World, seed: int, duration_s: float, out: Path, *, depth: bool = False) -> Result:
     """Explore one world from its start; draw what came of it."""
     floor = reachable_floor(world.raster, world.spawn[:2])
     area_m2 = float(np.count_nonzero(floor.floor)) * floor.cell_m**2
-    result = Result(world.name, seed, world.spawn, round(area_m2, 1))
+    result = Result(world.name, seed, world.spawn, round(area_m2, 1), depth=depth)
     simulator = Simulator(world, seed=seed)
     onlooker = Onlooker(simulator, floor, result)
     begin = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         core = build_core(RobotConfig(), Path(folder) / "map.lemto", durable=False, seed=seed)
-        ended = run_lockstep(simulator, core, parse_mission("explore"), duration_s, watch=onlooker)
+        camera = camera_of(simulator, core) if depth else None
+
+        def watch(now_s: float) -> None:
+            if camera is not None:
+                camera.poll(now_s)
+            onlooker(now_s)
+
+        ended = run_lockstep(simulator, core, parse_mission("explore"), duration_s, watch=watch)
         core.close()
     truth = simulator.truth()
     simulator.close()
@@ -149,14 +187,14 @@ def measured(name: str, seed: int, args: argparse.Namespace) -> Result:
     label = (
         f"{Path(name).parent.name}_{Path(name).stem}" if name.endswith(".yaml") else name.replace(":", "-")
     )
-    kept = args.out / f"{label}_{seed}.json"
+    kept = args.out / f"{label}_{seed}{'_depth' if args.depth else ''}.json"
     if kept.exists():
         return Result(**json.loads(kept.read_text()))
     print(f"  {label}, seed {seed}", flush=True)
     world = replace(worlds.load(name), name=label)
     if args.starts == "random":
         world = replace(world, spawn=random_start(world.raster, np.random.default_rng(seed)))
-    result = explore(world, seed, args.duration, kept.with_suffix(".png"))
+    result = explore(world, seed, args.duration, kept.with_suffix(".png"), depth=args.depth)
     kept.write_text(json.dumps(asdict(result), indent=1))
     return result
 
@@ -189,6 +227,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="runs of each world")
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--starts", choices=["random", "own"], default="random")
+    parser.add_argument("--depth", action="store_true", help="with the simulated depth camera")
     parser.add_argument("--duration", type=float, default=5400.0, metavar="S")
     parser.add_argument("--out", type=Path, default=Path("runs/explore"))
     args = parser.parse_args()
