@@ -63,7 +63,7 @@ class RouteConfig:
     """Costs of the topological route."""
 
     usual_speed_mps: float = 0.4  # what an edge without a learnt time is expected to take
-    unproven_s: float = 120.0  # on top for a closure nobody has driven: mostly a wall stands between its ends
+    unproven_s: float = 60.0  # on top for a closure nobody has driven: mostly a wall stands between its ends
     learnt_weight: float = 0.5  # share of learnt time against length over usual speed
     large_nodes: int = 3000  # from here on flat arrays are worth their building
     bucket_s: float = 1.0  # about the least price of an edge: then few nodes are corrected

@@ -129,7 +129,6 @@ class TopoMapper:
         self.store.tick(slam.stamp_s)
 
     # -- the steps of Figure 3-6 ----------------------------------------------------------------------------
-
     def _begin(self) -> None:
         """Stand on a first node; in a map that knows places already, look for one of them."""
         if self._lift is not None:
@@ -195,8 +194,7 @@ class TopoMapper:
         self.graph.put_node(replace(node, visits=node.visits + 1))
         self._take_places()
         self._align_associated()
-        seam = self._neighbours.seam_edge(node_id, self.graph, self.local, self._require().grid)
-        if seam is not None:
+        for seam in self._neighbours.seams_at(node_id, self.graph, self.local, self._require().grid):
             self.graph.add_edge(seam)
         if self._recogniser is not None:
             self._recogniser.at_node(self, born=False)
@@ -286,8 +284,7 @@ class TopoMapper:
     ) -> Edge:
         """Commit a closure between two nodes, of one component or two; returns the edge, for revoke.
 
-        When the source stands in this window, the target now does too; where the window shows the line
-        between them free, the robot can go straight there, as on a near-neighbour edge.
+        A target of a source in this window now stands there too, and over a free line it can be driven to.
         """
         edge = Edge(0, source_id, target_id, np.array(T_source_target), covariance, EdgeType.LOOP_CLOSING)
         source = self.local.standings.get(source_id)

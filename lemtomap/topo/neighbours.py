@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -53,8 +54,8 @@ class NeighbourFinder:
             if directly_navigable(grid, here.T_grid_node, there.T_grid_node, self._config):
                 yield self._edge(node_id, other_id, local)
 
-    def seam_edge(self, node_id: int, graph: PagedGraph, local: LocalMap, grid: GridView) -> Edge | None:
-        """Return an edge to the nearest node beside a node visited again that is far along the edges.
+    def seams_at(self, node_id: int, graph: PagedGraph, local: LocalMap, grid: GridView) -> Iterator[Edge]:
+        """Give the edge to the nearest node beside a node visited again that is far along the edges, if any.
 
         Two rounds through one corridor leave two chains of nodes side by side when the second was driven
         before its closure was found, and a bare corridor never tells how far along it the two are apart. The
@@ -63,10 +64,9 @@ class NeighbourFinder:
         """
         sigma_m, seam_m = self._config.seam_sigma_m, SEAM_SHARE * self._config.near_neighbour_max_m
         far = {other_id for other_id, reached in local.reached.items() if reached.distance_m > seam_m}
-        if not far or not _is_sure(local.standings[node_id], sigma_m):
-            return None
-        edge = next(self._edges_to(far, node_id, graph, local, grid, sigma_m), None)
-        return None if edge is None else replace(edge, share=0.0)
+        if far and _is_sure(local.standings[node_id], sigma_m):
+            for edge in islice(self._edges_to(far, node_id, graph, local, grid, sigma_m), 1):
+                yield replace(edge, share=0.0)
 
     def _candidates(
         self, others: Container[int], node_id: int, local: LocalMap, sigma_m: float
