@@ -5,8 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from lemtomap.topo.graph import Place
+from lemtomap.topo.store import TopoStore
 from tools import bench_compare, bench_scale
 from tools.soak import judging
+from tools.thesis.bare import bare_bytes
 from tools.thesis.page import to_html
 from tools.thesis.pieces import Piece, Pieces
 from tools.thesis.readings import curve_of
@@ -128,3 +131,14 @@ def test_report_page_keeps_text_from_being_markup():
     assert "<p>a &lt; b</p>" in page
     assert "<td>&lt;1&gt;</td>" in page
     assert "<li>two &amp; three</li>" in page
+
+
+def test_size_without_localisation_data_leaves_the_map_as_it_is(tmp_path):
+    path = tmp_path / "map.lemto"
+    with TopoStore.create(path, durable=False) as store:
+        for _ in range(50):
+            node = store.add_node()
+            store.put_place(node.node_id, Place(0.0, bytes(range(200)), bytes(72)))
+    whole = path.read_bytes()
+    assert bare_bytes(path) < 0.5 * len(whole)
+    assert path.read_bytes() == whole

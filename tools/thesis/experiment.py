@@ -13,6 +13,7 @@ import numpy as np
 from robot.outputs import versions
 from sim import worlds
 from tools.thesis import published, tables
+from tools.thesis.bare import bare_bytes
 from tools.thesis.chain import BASELINE, OURS, OURS_5, SYSTEMS, System, map_drive
 from tools.thesis.curves import draw_parts, draw_totals
 from tools.thesis.drives import Drive, local_and_whole_error_m, wrong_closures
@@ -140,6 +141,11 @@ class Experiment:
             for system in self._systems
         }
 
+    def _bare_kb(self, drive: Drive) -> float:
+        """Return the mean size of our maps of a drive without localisation data, kB."""
+        folders = [self._folder(drive, OURS, seed) for seed in range(self.plan.repetitions)]
+        return float(np.mean([bare_bytes(folder / "map.lemto") for folder in folders])) / 1000.0
+
     def report(self) -> str:
         """Write report.html, report.md and thesis.json; return the headline as Markdown."""
         drives = {drive.name: self.readings(drive) for drive in self.drives}
@@ -151,7 +157,7 @@ class Experiment:
                 for drive in self.drives
             ),
             "Size on disk (table 5-1; V0.5 kept no localisation data, in ours the robot finds itself again):",
-            tables.sizes(drives),
+            tables.sizes(drives, {drive.name: self._bare_kb(drive) for drive in self.drives}),
         ]
         if tasks:
             headline += ["Navigation, means of four legs (table 5-2):", tables.navigation(tasks)]

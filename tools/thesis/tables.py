@@ -78,8 +78,8 @@ def course(systems: Sequence[System], readings: Readings) -> str:
     return table(header, rows)
 
 
-def sizes(drives: Mapping[str, Readings]) -> str:
-    """Return table 5-1."""
+def sizes(drives: Mapping[str, Readings], bare_kb: Mapping[str, float]) -> str:
+    """Return table 5-1; bare_kb: size of our maps without localisation data, by drive."""
     rows = []
     for name, readings in drives.items():
         ours, theirs = readings[OURS.key].disk_kb, readings[BASELINE.key].disk_kb
@@ -90,12 +90,17 @@ def sizes(drives: Mapping[str, Readings]) -> str:
                 f"{ours:.1f}",
                 f"{theirs:.1f}",
                 difference(ours, theirs),
+                f"{bare_kb[name]:.1f}",
+                difference(bare_kb[name], theirs),
                 f"{then}",
                 f"{base}",
                 difference(then, base),
             ]
         )
-    header = ["drive", "LEMTOMap, kB", "baseline, kB", "difference", "2014: V0.5", "baseline", "difference"]
+    header = [
+        *("drive", "LEMTOMap, kB", "baseline, kB", "difference"),
+        *("without localisation data, kB", "difference", "2014: V0.5", "baseline", "difference"),
+    ]
     return table(header, rows)
 
 
