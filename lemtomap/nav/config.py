@@ -75,6 +75,10 @@ class RecoveryConfig:
 
     progress_m: float = 0.20  # nearer to the goal by this much ...
     progress_s: float = 6.0  # ... within this time, or something is wrong
+    longer_way_m: float = (
+        2.0  # this much made good of a way that proved longer than believed is progress too, ...
+    )
+    longer_ways: int = 3  # ... so many times for a goal
     polite_wait_s: float = 6.0  # what moves is given this long to make way
     closed_after_s: float = 2.5  # what stands still for this long is closed
     turn_s: float = 7.0

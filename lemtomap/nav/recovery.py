@@ -24,17 +24,24 @@ class Rung(IntEnum):
 
 
 class ProgressWatch:
-    """Tells when the robot has not come nearer to its goal for too long."""
+    """Tells when the robot has not come nearer to its goal for too long.
+
+    The way may prove longer than it was believed to be (a later part of a winding route had been taken for
+    the next one). Then what is made good of the longer way counts, but only so many times for a goal: two
+    targets by turns must not pass for progress for ever.
+    """
 
     def __init__(self, config: RecoveryConfig) -> None:
         self._config = config
         self._best_m = np.inf
         self._since_s = -np.inf
         self._gained_m = 0.0
+        self._longest_m = -np.inf
+        self._rises = 0
 
     def restart(self, now_s: float) -> None:
         """Begin anew: a new goal or a new route."""
-        self._best_m = np.inf
+        self._best_m, self._longest_m, self._rises = np.inf, -np.inf, 0
         self.grace(now_s)
 
     def take_gain(self) -> float:
@@ -44,7 +51,7 @@ class ProgressWatch:
 
     def move_goal(self) -> None:
         """The goal moved while the robot did not: measure anew, but the clock runs on."""
-        self._best_m = np.inf
+        self._best_m, self._longest_m = np.inf, -np.inf
 
     def grace(self, now_s: float) -> None:
         """Give what is being tried its time; what had been reached before still stands."""
@@ -56,9 +63,19 @@ class ProgressWatch:
             self._best_m = remaining_m
         elif remaining_m < self._best_m - self._config.progress_m:
             self._gained_m += self._best_m - remaining_m
-            self._best_m = remaining_m
+            self._best_m = self._longest_m = remaining_m
             self._since_s = now_s
+        elif self._proved_longer(remaining_m):
+            self._rises += 1
+            self._best_m = self._longest_m = remaining_m
+            self._since_s = now_s
+        self._longest_m = max(self._longest_m, remaining_m)
         return now_s - self._since_s > self._config.progress_s
+
+    def _proved_longer(self, remaining_m: float) -> bool:
+        """Tell whether a good piece was made good of a way that is longer than it was believed to be."""
+        made_good_m = self._longest_m - remaining_m
+        return self._rises < self._config.longer_ways and made_good_m >= self._config.longer_way_m
 
 
 class WayBack:
