@@ -35,7 +35,10 @@ class CostmapConfig:
     unknown_factor: float = 4.0  # unseen floor is driven only where nothing seen leads there
     live_hits: int = 2  # scans that must agree before a live obstacle counts: single ghosts do not
     live_decay_s: float = 8.0  # a live obstacle out of sight is believed this long
-    depth_decay_s: float = 30.0  # a depth camera is blind below 0.8 m, just where it matters
+    depth_decay_s: float = 60.0  # a depth camera is blind below 0.8 m, just where it matters
+    depth_grow_cells: int = (
+        1  # what it saw is passed blind, by a pose that has moved by some centimetres since
+    )
     live_range_m: float = 4.0  # beyond, the window alone is good enough
     contact_radius_m: float = 0.18  # of what was bumped into only one side is known; a chair's foot is wider
     contact_memory_s: float = 1800.0  # what the laser overlooks cannot be seen to go away

@@ -88,8 +88,8 @@ class Costs:
 class LiveLayer:
     """Obstacles one sensor saw lately, with the time each was last seen."""
 
-    def __init__(self, shape: tuple[int, ...], decay_s: float) -> None:
-        self.decay_s = decay_s
+    def __init__(self, shape: tuple[int, ...], decay_s: float, *, sees_near: bool) -> None:
+        self.decay_s, self.sees_near = decay_s, sees_near
         self.last_hit_s = np.full(shape, -np.inf)
         self.hits = np.zeros(shape, dtype=np.uint8)
 
@@ -122,7 +122,7 @@ class Costmap:
                 layer.roll(round(rows), round(cols))
 
     def see(self, sighting: Sighting, T_grid_odom: Pose) -> None:
-        """Clear along the rays of one sighting, those without return too, then mark what they met."""
+        """Clear along the rays of one sighting, those without return too, and mark what they met."""
         grid = self._grid
         if grid is None:
             return
@@ -136,20 +136,21 @@ class Costmap:
         scale = np.where(near, 1.0, reach / np.maximum(length, 1e-9))
         ends = self._cells(se2.transform(T_grid_base, origin + rays * scale[:, None]))
         start = self._cells(se2.transform(T_grid_base, origin[None, :]))[0]
+        if sighting.floor_base is None and len(rays):
+            kernels.clear_rays(layer.last_hit_s, layer.hits, start[0], start[1], ends[:, 0], ends[:, 1], 1.5)
+        marks, stamp_s = ends[: len(sighting.hits_base)][near[: len(sighting.hits_base)]], sighting.stamp_s
+        kernels.mark_hits(layer.last_hit_s, layer.hits, marks[:, 0], marks[:, 1], stamp_s)
         if sighting.floor_base is not None:
             floor = self._cells(se2.transform(T_grid_base, sighting.floor_base))
-            kernels.clear_cells(layer.last_hit_s, layer.hits, floor[:, 0], floor[:, 1])
-        elif len(rays):
-            kernels.clear_rays(layer.last_hit_s, layer.hits, start[0], start[1], ends[:, 0], ends[:, 1], 1.5)
-        marks = ends[: len(sighting.hits_base)][near[: len(sighting.hits_base)]]
-        kernels.mark_hits(layer.last_hit_s, layer.hits, marks[:, 0], marks[:, 1], sighting.stamp_s)
+            cells = np.unique(np.floor(floor).astype(np.int64), axis=0)
+            kernels.clear_cells(layer.last_hit_s, layer.hits, cells, stamp_s)
 
     def _layer(self, sighting: Sighting, grid: GridView) -> LiveLayer:
         layer = self._live.get(sighting.source)
         flat = sighting.floor_base is None
         decay_s = self._config.live_decay_s if flat else self._config.depth_decay_s
         if layer is None:
-            layer = self._live[sighting.source] = LiveLayer(grid.occupancy.shape, decay_s)
+            layer = self._live[sighting.source] = LiveLayer(grid.occupancy.shape, decay_s, sees_near=flat)
         return layer
 
     def hold(self, p_grid: ArrayLike, radius_m: float, until_s: float) -> None:
@@ -162,8 +163,8 @@ class Costmap:
             layer.last_hit_s[rows[close], cols[close]] = until_s - layer.decay_s
 
     def forget_live(self) -> None:
-        """Drop all live obstacles: the next scans tell anew."""
-        self._live.clear()
+        """Drop the live obstacles that the next scans tell anew; a camera does not see what is below it."""
+        self._live = {source: layer for source, layer in self._live.items() if not layer.sees_near}
 
     def build(
         self,
@@ -209,7 +210,8 @@ class Costmap:
         for layer in self._live.values():
             last_hit_s = np.ascontiguousarray(layer.last_hit_s[part])
             hits = np.ascontiguousarray(layer.hits[part])
-            kernels.add_live(state, last_hit_s, hits, now_s, layer.decay_s, self._config.live_hits)
+            grow = 0 if layer.sees_near else self._config.depth_grow_cells
+            kernels.add_live(state, last_hit_s, hits, now_s, layer.decay_s, self._config.live_hits, grow)
         return state
 
     @property

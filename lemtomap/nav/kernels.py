@@ -18,6 +18,7 @@ I8 = NDArray[np.int64]
 U1 = NDArray[np.uint8]
 
 FREE, UNKNOWN, LETHAL = 0, 1, 2
+MOST_HITS = 4  # of a live obstacle: so many looks at the floor where it stood, and it is gone
 
 
 @njit(nogil=True, cache=True)
@@ -53,13 +54,18 @@ def clear_rays(
 
 
 @njit(nogil=True, cache=True)
-def clear_cells(last_hit_s: F8, hits: U1, rows: F8, cols: F8) -> None:
-    """Forget live obstacles in the cells of these points."""
+def clear_cells(last_hit_s: F8, hits: U1, cells: I8, now_s: float) -> None:
+    """Believe live obstacles in these cells (N, 2) one hit less, but not those just hit.
+
+    A thin bar, or the edge of any thing, leaves floor to be seen in its cell, or in the next look beside it.
+    """
     height, width = last_hit_s.shape
-    for i in range(rows.size):
-        r, c = int(np.floor(rows[i])), int(np.floor(cols[i]))
-        if r >= 0 and c >= 0 and r < height and c < width:
-            hits[r, c] = 0
+    for i in range(cells.shape[0]):
+        r, c = cells[i, 0], cells[i, 1]
+        if r < 0 or c < 0 or r >= height or c >= width or last_hit_s[r, c] == now_s or hits[r, c] == 0:
+            continue
+        hits[r, c] -= 1
+        if hits[r, c] == 0:
             last_hit_s[r, c] = -np.inf
 
 
@@ -72,7 +78,7 @@ def mark_hits(last_hit_s: F8, hits: U1, rows: F8, cols: F8, now_s: float) -> Non
         if r < 0 or c < 0 or r >= height or c >= width or last_hit_s[r, c] >= now_s:
             continue
         last_hit_s[r, c] = now_s
-        if hits[r, c] < 100:
+        if hits[r, c] < MOST_HITS:
             hits[r, c] += 1
 
 
@@ -103,8 +109,13 @@ def classify(occupancy: I1, occupied_percent: int, state: U1) -> None:
 
 
 @njit(nogil=True, cache=True)
-def add_live(state: U1, last_hit_s: F8, hits: U1, now_s: float, decay_s: float, live_hits: int) -> None:
-    """Mark live obstacles that are fresh and seen often enough; forget those that are stale."""
+def add_live(
+    state: U1, last_hit_s: F8, hits: U1, now_s: float, decay_s: float, live_hits: int, grow: int
+) -> None:
+    """Mark live obstacles that are fresh and seen often enough, and `grow` cells on every side of them.
+
+    Those that are stale are forgotten.
+    """
     height, width = state.shape
     for r in range(height):
         for c in range(width):
@@ -114,7 +125,9 @@ def add_live(state: U1, last_hit_s: F8, hits: U1, now_s: float, decay_s: float, 
                 hits[r, c] = 0
                 last_hit_s[r, c] = -np.inf
             elif hits[r, c] >= live_hits:
-                state[r, c] = LETHAL
+                for k in range(-grow, grow + 1):
+                    state[min(max(r + k, 0), height - 1), c] = LETHAL
+                    state[r, min(max(c + k, 0), width - 1)] = LETHAL
 
 
 @njit(nogil=True, cache=True)

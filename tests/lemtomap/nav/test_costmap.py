@@ -66,6 +66,32 @@ def test_open_space_clears_and_nan_does_not():
         assert (int(left.sum()) < before / 10) == cleared, value
 
 
+def test_floor_seen_beside_a_thin_bar_does_not_hide_it_and_floor_seen_where_it_was_does():
+    costmap, robot = fresh(), se2.pose(1.0, 3.0, 0.0)
+    aside = np.linspace(-0.3, 0.3, 61)
+    floor = np.column_stack([np.repeat([1.01, 1.04], 61), np.tile(aside, 2), np.zeros(122)])
+    bar = np.column_stack([np.full(61, 1.02), aside, np.full(61, 0.1)])
+    for stamp_s in (0.0, 0.2, 0.4):
+        costmap.see(Sighting.from_cloud(stamp_s, robot, np.concatenate([floor, bar])), se2.IDENTITY)
+    assert lethal(costmap, 0.4) >= 12
+    costmap.see(Sighting.from_cloud(0.6, robot, floor), se2.IDENTITY)
+    assert lethal(costmap, 0.6) >= 12  # one look beside it, by a pose that moved a little
+    for stamp_s in (0.8, 1.0, 1.2):
+        costmap.see(Sighting.from_cloud(stamp_s, robot, floor), se2.IDENTITY)
+    assert lethal(costmap, 1.2) == 0
+
+
+def test_recovering_forgets_what_the_laser_sees_again_not_what_lies_below_the_camera():
+    costmap, robot = fresh(), se2.pose(1.0, 3.0, 0.0)
+    bar = np.column_stack([np.full(61, 1.02), np.linspace(-0.3, 0.3, 61), np.full(61, 0.1)])
+    for stamp_s in (0.0, 0.2):
+        see(costmap, stamp_s, 2.0)
+        costmap.see(Sighting.from_cloud(stamp_s, robot, bar), se2.IDENTITY)
+    both = lethal(costmap, 0.2)
+    costmap.forget_live()
+    assert 12 <= lethal(costmap, 0.2) < both
+
+
 def test_live_obstacles_stay_where_they_are_when_the_window_rolls():
     costmap = fresh()
     see(costmap, 0.0, 2.0)
