@@ -40,6 +40,10 @@ class Standing:
     seen: Covariance | None = None
     """What the window alone says of the pose, the graph's prediction apart; None when it says nothing."""
 
+    def is_within(self, sigma_m: float) -> bool:
+        """Tell whether its place is known this well in every direction, one standard deviation."""
+        return float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]) <= sigma_m**2
+
 
 class LocalMap:
     """Poses of nearby nodes in the grid frame, anchored at the associated node."""
@@ -83,8 +87,7 @@ class LocalMap:
         for away_m, node_id in sorted(away):
             if away_m > within_m:
                 break
-            covariance = self.standings[node_id].covariance
-            if float(np.linalg.eigvalsh(covariance[:2, :2])[-1]) <= sigma_m**2:
+            if self.standings[node_id].is_within(sigma_m):
                 return node_id
         return 0
 

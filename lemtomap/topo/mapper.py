@@ -129,6 +129,7 @@ class TopoMapper:
         self.store.tick(slam.stamp_s)
 
     # -- the steps of Figure 3-6 ----------------------------------------------------------------------------
+
     def _begin(self) -> None:
         """Stand on a first node; in a map that knows places already, look for one of them."""
         if self._lift is not None:
@@ -383,8 +384,7 @@ class TopoMapper:
         """Return how likely T_node_base is right, 0 to 1; nothing is while the robot is lost."""
         if self.lost:
             return 0.0
-        measured = self._transform.measured
-        born = self.local.standings[self._associated_id].born
+        born, measured = self.local.standings[self._associated_id].born, self._transform.measured
         return pose_quality(self._drift, self.fit, born=born, measured=measured, config=self.config.watch)
 
     def close(self) -> None:

@@ -101,8 +101,7 @@ class NeighbourFinder:
 
 def _is_sure(standing: Standing, sigma_m: float) -> bool:
     """Tell whether a node stands in the window by measurement, or is predicted well enough."""
-    variance = float(np.linalg.eigvalsh(standing.covariance[:2, :2])[-1])
-    return standing.anchored or variance <= sigma_m**2
+    return standing.anchored or standing.is_within(sigma_m)
 
 
 def directly_navigable(grid: GridView, start: Pose, end: Pose, config: TopoConfig) -> bool:
