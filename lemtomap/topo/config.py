@@ -26,8 +26,10 @@ class TopoConfig:
     place_radius_m: float = 5.0  # half the window less the distance at which data is taken
     place_taken_at_m: float = 3.5  # with the radius: still whole in a 20 m window, surroundings all seen
     place_byte_budget: int = 240  # at most; some 150 on average, so that 300 hold with the descriptor
-    place_alike_score: float = 0.8  # a visit that sees this share of a place finds it unchanged
-    place_stale_visits: int = 3  # so many visits in a row that do not, and it is taken anew
+    place_apart_m: float = 0.1  # half of what a point must be off all others to be another thing
+    place_new_within_m: float = 2.5  # of the node: what is new farther off may only not have been seen before
+    place_changes: int = 6  # points that are new or gone (0.3 m of surface) make another place, ...
+    place_stale_visits: int = 2  # ... and so many visits in a row that find it so have it taken anew
     match: MatchConfig = field(default_factory=MatchConfig)
     watch: WatchConfig = field(default_factory=WatchConfig)
     fresh_m: float = 10.0  # way after which a node's place in the window is measured again

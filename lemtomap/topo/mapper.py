@@ -194,6 +194,7 @@ class TopoMapper:
         node = self.graph.node(node_id)
         self.graph.put_node(replace(node, visits=node.visits + 1))
         self._take_places()
+        self.keeper.review(node_id)
         self._align_associated()
         for seam in self._neighbours.seams_at(node_id, self.graph, self.local, self._require().grid):
             self.graph.add_edge(seam)
@@ -255,7 +256,6 @@ class TopoMapper:
         if match.refused:
             return Transform(False, standing.covariance, match.score, match.refused)
         self.local.anchor(node_id, match.T_grid_node, match.covariance)
-        self.keeper.compare(node_id, match)
         return Transform(measured=True, covariance=match.covariance, score=match.score)
 
     def _anchor_beside(self, node_id: int) -> None:

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import between, compose, pose
-from lemtomap.topo.align import Match
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed, GroundSeen, OpeningDone, OpeningSeen
 from lemtomap.topo.graph import OpeningState, Place
 from lemtomap.topo.local import LocalMap
 from lemtomap.topo.mapper import TopoMapper
+from lemtomap.topo.place import decode_place
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
@@ -116,22 +116,35 @@ def test_a_known_map_is_gone_on_with_in_a_part_of_its_own(tmp_path):
     elsewhere.close()
 
 
-def test_one_glance_at_a_changed_place_renews_nothing_but_several_visits_do(tmp_path):
+def test_one_glance_at_a_changed_place_renews_nothing_but_visits_in_a_row_do(tmp_path):
     mapper = TopoMapper(TopoConfig(), TopoStore.create(tmp_path / "map.lemto"))
-    stamp = lead(mapper, [(-5, 0), (2, 0)], room(walls=[(-6, 1, 6, 1.2), (-6, -1.2, 6, -1)]))
+    before = room(walls=[(-6, 1, 6, 1.2), (-6, -1.2, 6, -1)])
+    after = room(walls=[(-6, 1, 6, 1.2), (-6, -1.2, 6, -1), (-5.3, 0.5, -4.9, 0.7)])
+    there_and_back = [(2, 0), (-5, 0), (2, 0)]
+    stamp = lead(mapper, [(-5, 0), (2, 0)], before)
     taken = mapper.store.place(1)
-    assert taken is not None
-    changed, same = (Match(pose(0, 0, 0), SURE, score) for score in (0.65, 0.95))
-    limit = mapper.config.place_stale_visits
-    for match in [changed] * (limit - 1) + [same] + [changed] * (limit - 1):
-        mapper.keeper.compare(1, match)
-    stamp = lead(mapper, [(2, 0), (2.9, 0)], room(), start_s=stamp)
-    assert mapper.store.place(1) == taken
-    mapper.keeper.compare(1, changed)
-    lead(mapper, [(2.9, 0), (5, 0)], room(walls=[(-6, 2, 6, 2.2)]), start_s=stamp)
+    for grid in (before, after, before, after):
+        stamp = lead(mapper, there_and_back, grid, start_s=stamp)
+        assert mapper.store.place(1) == taken
+    lead(mapper, there_and_back, after, start_s=stamp)
     renewed = mapper.store.place(1)
     assert isinstance(renewed, Place)
     assert renewed.taken_s > taken.taken_s
+    points = decode_place(renewed.boundary).points
+    assert (np.hypot(*(points - [0.0, 0.5]).T) < 0.2).any()
+    mapper.close()
+
+
+def test_what_was_taken_away_makes_a_place_stale_as_well(tmp_path):
+    mapper = TopoMapper(TopoConfig(), TopoStore.create(tmp_path / "map.lemto"))
+    full, cleared = (
+        room(walls=[(-8, 1.5, 8, 1.7), *chest]) for chest in ([(-5.3, 0.5, -4.9, 0.7)], list[tuple]())
+    )
+    stamp = lead(mapper, [(-5, 0), (2, 0)], full)
+    taken = mapper.store.place(1)
+    for _ in range(2):
+        stamp = lead(mapper, [(2, 0), (-5, 0), (2, 0)], cleared, start_s=stamp)
+    assert mapper.store.place(1) != taken
     mapper.close()
 
 
