@@ -19,6 +19,7 @@ TURN_S, TURN_RADPS = 6.6, 1.0  # a lost robot looks round once before it drives
 LIMIT_S, LIMIT_M = 30.0, 3.0
 RIGHT_M, RIGHT_RAD = 0.3, 0.1  # found at the right place; how exactly, the poses' quality tells
 KNOWN_M = 1.5  # from a known node: elsewhere nothing is mapped
+UNKNOWN_M = 6.0  # from every known node: nothing that is mapped is in sight of a short-sighted laser
 ENDS = (".lemto", ".born.json")
 Found = dict[str, Any]
 
@@ -38,6 +39,15 @@ class Trial:
         robot.put(start)
         found = _find(robot, judged, world, rng)
         return _told(found, robot, judged, path, noticed=True)
+
+    def elsewhere(self, world: World, seed: int) -> Found:
+        """Put the robot down where nothing is mapped: it must not believe to be anywhere it knows."""
+        rng = np.random.default_rng([seed, 3])
+        robot, judged, path = self._begin(world, seed)
+        robot.put(_place_at(path, world, rng, UNKNOWN_M, np.inf))
+        found = _find(robot, judged, world, rng)
+        told = _told(found, robot, judged, path, noticed=True)
+        return told | {"ok": not told["wrong"]}
 
     def carried(self, world: World, seed: int) -> Found:
         """Let the robot find itself, drive a bit, carry it, and wait until it knows again."""
@@ -140,9 +150,14 @@ def _is_joined(judged: JudgedMap) -> bool:
 
 
 def _known_place(path: Path, world: World, rng: np.random.Generator) -> Pose:
-    """Return a random pose within reach of the building's start near a known node."""
+    """Return a random pose near a known node."""
+    return _place_at(path, world, rng, 0.0, KNOWN_M)
+
+
+def _place_at(path: Path, world: World, rng: np.random.Generator, least_m: float, most_m: float) -> Pose:
+    """Return a random pose within reach of the building's start and so far from the nearest known node."""
     nodes = np.array([T[:2] for T in load_born(path).values()])
     places = np.array(RoutePlanner(world.raster).places(world.spawn[:2], 0.5))
     gap_m = np.hypot(*(places[:, None] - nodes[None]).transpose(2, 0, 1)).min(axis=1)
-    chosen = places[rng.choice(np.flatnonzero(gap_m <= KNOWN_M))]
+    chosen = places[rng.choice(np.flatnonzero((gap_m >= least_m) & (gap_m <= most_m)))]
     return np.array([*chosen, rng.uniform(-np.pi, np.pi)])

@@ -1,13 +1,14 @@
 """Where in a known map is this? Start anywhere, carried elsewhere, lost (thesis, section 7-2).
 
 The robot maps on as if the place were new; meanwhile what it sees is searched for in the places of the rest
-of the map, those most alike first, a slice per scan. Each pose found is a guess that stands in the window,
-and is looked at again as the robot moves: does everything seen lie on what is stored, and does nothing stored
-lie where the robot looked through? The one guess that keeps fitting where all others fail is where it is.
+of the map, those most alike first (panorama), a slice per scan. Each pose found is a guess that stands in the
+window, and is looked at again as the robot moves: does everything seen lie on what is stored, and does
+nothing stored lie where the robot looked through? The one guess that keeps fitting where all others fail, or
+that explains what others never make up for, is where it is.
 Two that fit alike are two: then the robot stays lost, for a wrong answer is worse than none.
 """
 
-from collections import OrderedDict, deque
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -20,15 +21,16 @@ from lemtomap.topo.loops.config import LocatorConfig, LoopConfig
 from lemtomap.topo.loops.descriptor import describe
 from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.loops.index import PlaceIndex
+from lemtomap.topo.loops.lineup import LineUp
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
-from lemtomap.topo.loops.places import RASTER_M, Company, PlaceBook, chain, kept
+from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
+from lemtomap.topo.loops.places import Company, PlaceBook, chain, kept
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.types import GridView
 
 Points = NDArray[np.float64]
 RECENT = 3  # checks that tell how well a guess fits
 PICTURES_KEPT = 16  # 0.3 MB each
-BORDER_CELLS = 4  # round a stored place as a picture, so that a point beside it falls off its walls
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,18 +75,6 @@ class Guess:
         return float(np.mean(self.fits[-RECENT:]))
 
 
-@dataclass(frozen=True, slots=True)
-class _Trial:
-    """When a place was searched last, and how often."""
-
-    travelled_m: float
-    turned_rad: float
-    times: int
-
-
-NEVER = _Trial(-np.inf, -np.inf, 0)
-
-
 class Locator:
     """Finds one robot that does not know where it is. Thrown away once it has."""
 
@@ -95,18 +85,13 @@ class Locator:
         self.config: LocatorConfig = config.locator
         self._loops = config
         self._graph = graph
-        self._index = index
-        self._is_known = is_known
         self.places = PlaceBook(graph, config.company_m, config.search_points, kept=128)
         self.guesses: list[Guess] = []
         self.searched = 0
-        self._queue: deque[int] = deque()
+        self.line_up = LineUp(self.config, index, self.places, is_known)
         self._search: tuple[int, _View, Search] | None = None
-        self._tried: dict[int, _Trial] = {}
         self._pictures: OrderedDict[int, Reference] = OrderedDict()
         self._view: _View | None = None
-        self._heard = 0
-        self._all_heard = False
 
     def due(self, travelled_m: float, turned_rad: float) -> bool:
         """Tell whether the robot has moved enough for another look."""
@@ -123,75 +108,52 @@ class Locator:
             self._check(guess, view)
         self.guesses = [guess for guess in self.guesses if guess.fit >= self.config.alive]
         self._unite()
-        if view.has_structure and not self._queue and self._search is None:
-            self._line_up(view)
+        if view.has_structure and self.line_up.is_over and self._search is None:
+            self.line_up.begin(view.all_round_base, view.descriptor, look.travelled_m, look.turned_rad)
 
     def update(self, budget: int) -> Located | None:
         """Search on for a slice (bound evaluations); return where the robot is once that is certain."""
-        while budget > 0 and (self._search is not None or self._queue):
+        while budget > 0 and (self._search is not None or not self.line_up.is_over):
             budget -= self._work(budget)
         return self._certain()
 
     # -- searching
     # --------------------------------------------------------------------------------------------
 
-    def _line_up(self, view: "_View") -> None:
-        """Choose the places most alike, none beside another, those tried least first."""
-        count, look = self.config.candidates, view.look
-        covered: set[int] = set()
-        chosen: list[tuple[int, int, int]] = []
-        alikes = self._index.nearest(view.descriptor, 12 * count, leaves=self.config.leaves)
-        for rank, alike in enumerate(alikes):
-            node_id = alike.node_id
-            if node_id in covered or not self._is_known(node_id):
-                continue
-            covered.update(self.places.around(node_id, self.config.spacing_m, 24))
-            trial = self._tried.get(node_id, NEVER)
-            if (
-                look.travelled_m - trial.travelled_m >= self.config.again_m
-                or look.turned_rad - trial.turned_rad >= self.config.again_rad
-            ):
-                chosen.append((trial.times, rank, node_id))
-        self._queue.extend(node_id for _, _, node_id in sorted(chosen)[:count])
-        self._all_heard = self._all_heard or not self._queue
-
     def _work(self, budget: int) -> int:
         """Do a slice of the search under way, or begin the next; return the work spent."""
         if self._search is None:
-            node_id, view = self._queue.popleft(), self._view
-            company = self.places.company(node_id)
-            if company is None or view is None or len(company.points_node) < self._loops.points:
-                return 1
-            times = self._tried.get(node_id, NEVER).times + 1
-            self._tried[node_id] = _Trial(view.look.travelled_m, view.look.turned_rad, times)
-            half_m = self.config.box_m
-            box = SearchBox(np.zeros(3), half_m, half_m, np.pi)
-            least = self.config.first_score if times == 1 else 0.0
-            self._search = node_id, view, Search(self._picture(company), view.search_points, box, least)
-            self.searched += 1
-            return self.config.picture_work
+            return self._begin_search() or self.line_up.rank(budget)
         node_id, view, search = self._search
         before = search.work
         if search.advance(budget):
             self._search = None
-            self._heard += 1
-            self._all_heard = self._all_heard or not self._queue
             self._take(node_id, view, search)
+            self.line_up.searched()
         return max(1, search.work - before)
+
+    def _begin_search(self) -> int:
+        """Take up the next place lined up; return the work of reading it, 0 when none is."""
+        chosen, view = self.line_up.next(), self._view
+        if chosen is None or view is None:
+            return 0
+        node_id, times = chosen
+        company = self.places.company(node_id)
+        if company is None or len(company.points_node) < self._loops.points:
+            self.line_up.searched()
+            return 1
+        half_m = self.config.box_m
+        box = SearchBox(np.zeros(3), half_m, half_m, np.pi)
+        least = 0.0 if times else self.config.first_score
+        self._search = node_id, view, Search(self._picture(company), view.search_points, box, least)
+        self.searched += 1
+        return self.config.picture_work
 
     def _picture(self, company: Company) -> Reference:
         """Return a stored place as the fixed side of a search: walls, and nothing known of the rest."""
-        return kept(self._pictures, company.node_id, PICTURES_KEPT, lambda _: self._draw(company))
-
-    def _draw(self, company: Company) -> Reference:
-        cells = np.floor(company.points_node / RASTER_M).astype(np.int64)
-        low = cells.min(axis=0) - BORDER_CELLS
-        cols, rows = cells.max(axis=0) - low + BORDER_CELLS + 1
-        occupancy = np.full((rows, cols), -1, dtype=np.int8)
-        occupancy[cells[:, 1] - low[1], cells[:, 0] - low[0]] = 100
-        origin_m = (float(low[0]) * RASTER_M, float(low[1]) * RASTER_M)
-        view = GridView(0.0, occupancy, RASTER_M, origin_m)
-        return Reference(view, company.points_node, self.config.match)
+        return kept(
+            self._pictures, company.node_id, PICTURES_KEPT, lambda _: picture_of(company, self.config.match)
+        )
 
     def _take(self, node_id: int, view: "_View", search: Search) -> None:
         """Make guesses of the best pose of a search and of its runner-up."""
@@ -229,12 +191,19 @@ class Locator:
 
     def _nearest(self, guess: Guess, view: "_View") -> tuple[int, Pose] | None:
         """Return the known node nearest to the robot under this guess, and where it stands."""
+        near = self._nearest_within(guess, view, self.config.follow_m, 48)
+        if near is None or _gap_m(near[1], view) > self.config.near_m:
+            near = self._nearest_within(guess, view, self.config.far_m, 192) or near
+        return near
+
+    def _nearest_within(
+        self, guess: Guess, view: "_View", way_m: float, limit: int
+    ) -> tuple[int, Pose] | None:
         best: tuple[int, Pose] | None = None
         best_m = np.inf
-        x_m, y_m, _ = view.look.T_grid_base.tolist()
-        for node_id, T_node_other in self.places.around(guess.node_id, self.config.follow_m, 48).items():
+        for node_id, T_node_other in self.places.around(guess.node_id, way_m, limit).items():
             at = compose(guess.T_grid_node, T_node_other)
-            gap_m = float(np.hypot(at[0] - x_m, at[1] - y_m))
+            gap_m = _gap_m(at, view)
             if gap_m < best_m and self.places.descriptor(node_id) is not None:
                 best, best_m = (node_id, at), gap_m
         return best
@@ -279,19 +248,34 @@ class Locator:
     def _certain(self) -> Located | None:
         """Return the guess that keeps fitting while no other does; None while there is doubt."""
         config, view = self.config, self._view
-        if view is None or not self.guesses or not (self._all_heard or self._heard >= config.candidates):
+        if view is None or not self.guesses or not self.line_up.heard:
             return None
         best, *others = sorted(self.guesses, key=lambda guess: -guess.fit)
-        rivals = (other for other in others if not self._same_by_far(best, other))
-        rival = next(rivals, None)
-        lead = 1.0 if rival is None else best.fit - rival.fit
-        if best.match is None or lead < config.margin or not self._is_sound(best, best.match, view):
+        rivals = [other for other in others if not self._same_by_far(best, other)]
+        lead = min((best.fit - rival.fit for rival in rivals), default=1.0)
+        if best.match is None or not self._is_sound(best, best.match, view):
+            return None
+        if not all(self._beats(best, rival, view) for rival in rivals):
             return None
         needed_m = config.moved_m * (0.5 if lead >= config.clear_margin else 1.0)
         moved_m = view.look.travelled_m - best.from_m
         if moved_m < needed_m and view.look.turned_rad - best.from_rad < config.moved_rad:
             return None
         return Located(best.node_id, best.T_grid_node, best.match.covariance, best.match)
+
+    def _beats(self, best: Guess, rival: Guess, view: "_View") -> bool:
+        """Tell whether a guess fits clearly better, or alone explains what the other never makes up for."""
+        if best.fit - rival.fit >= self.config.margin:
+            return True
+        one, other = self._seen_in(best), self._seen_in(rival)
+        if one is None or other is None:
+            return False
+        own, alien = told_apart(transform(view.look.T_grid_base, view.points_base), one, other)
+        return own >= self.config.alone and own >= self.config.alone_times * alien
+
+    def _seen_in(self, guess: Guess) -> Placed | None:
+        company = self.places.company(guess.node_id)
+        return None if company is None else Placed(self._picture(company), guess.T_grid_node)
 
     def _is_sound(self, guess: Guess, match: Match, view: "_View") -> bool:
         """Tell whether a guess has borne every check of late, on walls that hold it in every direction."""
@@ -310,6 +294,7 @@ class _View:
         self.look = look
         self.reference = Reference(look.grid, look.points_grid, loops.match)
         points = transform(inverse(look.T_grid_base), look.points_grid)
+        self.all_round_base: Points = np.ascontiguousarray(points)
         self.points_base: Points = points[np.hypot(points[:, 0], points[:, 1]) <= config.view_m]
         self.search_points = np.ascontiguousarray(self.points_base[_every(len(self.points_base), config)])
         around = np.abs(points).max(axis=1, initial=0.0) <= loops.describe_m
@@ -322,6 +307,11 @@ class _View:
         origin_m, points = picture.grid.origin_m, self.search_points
         hit, _, _ = fitting.tally(points, T_node_base, picture.field, *origin_m, picture.cell_m)
         return float(hit / max(1, len(points)))
+
+
+def _gap_m(T_grid_node: Pose, view: _View) -> float:
+    x_m, y_m, _ = (T_grid_node - view.look.T_grid_base).tolist()
+    return float(np.hypot(x_m, y_m))
 
 
 def _every(count: int, config: LocatorConfig) -> NDArray[np.int64]:

@@ -159,6 +159,37 @@ def tally(
 
 
 @njit(nogil=True, cache=True)
+def told_apart(
+    points_m: Values,
+    one_pose: Values,
+    one_score: Scores,
+    one_frame: Values,
+    other_pose: Values,
+    other_score: Scores,
+    other_frame: Values,
+) -> tuple[int, int]:
+    """Count the points that only one of two pictures explains: (by the one, by the other).
+
+    one_score, other_score: score fields; frames: float64 (3,), x and y of the field's corner and its cell, m.
+    """
+    own, alien = 0, 0
+    for i in range(points_m.shape[0]):
+        by_one = _explains(points_m[i, 0], points_m[i, 1], one_pose, one_score, one_frame)
+        by_other = _explains(points_m[i, 0], points_m[i, 1], other_pose, other_score, other_frame)
+        own += by_one and not by_other
+        alien += by_other and not by_one
+    return own, alien
+
+
+@njit(nogil=True, cache=True)
+def _explains(x_m: float, y_m: float, pose: Values, score: Scores, frame: Values) -> bool:
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    c = int(np.floor((cos * x_m - sin * y_m + pose[0] - frame[0]) / frame[2]))
+    r = int(np.floor((sin * x_m + cos * y_m + pose[1] - frame[1]) / frame[2]))
+    return bool(0 <= r < score.shape[0] and 0 <= c < score.shape[1] and score[r, c] > 0)
+
+
+@njit(nogil=True, cache=True)
 def share_near(
     points_m: Values,
     targets_m: Values,
