@@ -241,7 +241,7 @@ class LoopCloser:
             self._testify(task, match)
             return
         hypothesis = None
-        if match is not None and self._judge.is_sighting(match, task) and not self._confirms(match, task):
+        if match is not None and self._is_news(match, task):
             hypothesis = self.hypotheses.add(self._judge.sighting(task, match))
             if self.log:
                 self.log(
@@ -254,6 +254,14 @@ class LoopCloser:
             task.follows.rejected += 1
         if task.hearing_for is not None and not any(t.hearing_for is task.hearing_for for t in self._tasks):
             task.hearing_for.heard = True
+
+    def _is_news(self, match: Match, task: Task) -> bool:
+        """Tell whether a search found a place where the mapper does not have it anyway."""
+        return (
+            self._judge.is_sighting(match, task)
+            and not self._confirms(match, task)
+            and not self._judge.is_alias(match, task)
+        )
 
     def _testify(self, task: Task, match: Match | None) -> None:
         """Let a place speak for or against the closures by which it must be here; silent when unsure."""

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lemtomap.se2 import between
+from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo.graph import Covariance, chain_covariance
 from lemtomap.topo.loops.cases import Task, reversed_covariance
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Sighting
 from lemtomap.topo.loops.matcher import Match
+from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
 from lemtomap.topo.loops.places import Company, PlaceBook
 
 
@@ -40,6 +41,32 @@ class Judge:
             and match.rival <= config.rival
             and explained >= config.points
         )
+
+    def is_alias(self, match: Match, task: Task) -> bool:
+        """Tell whether a place found elsewhere than the graph has it only resembles what is known there.
+
+        A corridor of like rooms shows each place again a door further on. Where the robot's own node is not
+        sure the search is wide, for the window may have slipped along; but then what the graph has there must
+        fit worse: alone, without its neighbour's walls, the place found must explain what is seen.
+        """
+        here, config = task.situation, self.config
+        if here.here_id in here.measured:
+            return False
+        known = self.places.around(here.here_id, config.alias_way_m, 192)
+        expected = known.get(task.node_id)
+        if expected is None or _gap_m(compose(here.T_grid_here, expected), match) <= 2.0 * config.agree_m:
+            return False
+        at = {n: compose(here.T_grid_here, T) for n, T in known.items() if self.places.has(n)}
+        nearest = min(at, key=lambda node_id: _gap_m(at[node_id], match), default=0)
+        companies = [self.places.company(node_id) for node_id in (task.node_id, nearest)]
+        if companies[0] is None or companies[1] is None or _gap_m(at[nearest], match) > config.alias_near_m:
+            return False
+        points = task.reference.points_grid
+        around = points[np.hypot(*(points - match.T_grid_place[:2]).T) <= config.describe_m]
+        found = Placed(picture_of(companies[0], config.match), match.T_grid_place)
+        thought = Placed(picture_of(companies[1], config.match), at[nearest])
+        own, alien = told_apart(around, found, thought)
+        return own < config.alias_points + alien
 
     def sighting(self, task: Task, match: Match) -> Sighting:
         """Relate the node found to the node the robot was at."""
@@ -88,3 +115,7 @@ class Judge:
             return False
         match = task.reference.refine(company.points_node, task.T_grid_followed)
         return match.known >= self.config.known and match.contradicted >= self.config.refuted
+
+
+def _gap_m(T_grid_node: Pose, match: Match) -> float:
+    return float(np.hypot(*(T_grid_node[:2] - match.T_grid_place[:2])))
