@@ -45,6 +45,7 @@ class SlamConfig:
     large_turn_rad: float = 0.3  # odometry that turns more between two scans is searched all round
     search_rad: float = 1.6  # how far round: the worst of the logs turns 85 degrees between two scans
     search_m: float = 0.3
+    doubted_share: float = 0.5  # of the wheels' way; a match further off is made again without what moves
     good_share: float = 0.9  # of the usual quality; under it the share of known ground is looked at
     collapse_share: float = 0.7  # of the usual quality; below it the wheels are taken to have slipped: search
     quality_memory: float = 0.05  # share of the newest match in the usual quality

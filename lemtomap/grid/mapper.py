@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.grid.config import SlamConfig
+from lemtomap.grid.foreground import without_foreground
 from lemtomap.grid.matching import Match, Matcher, refused
 from lemtomap.grid.matching import kernels as matching_kernels
 from lemtomap.grid.motion import Uncertainty, WheelTrust, between, compose, odometry_uncertainty
@@ -172,6 +173,11 @@ class Tracker(ABC):
         uncertainty = self._trust.widen(expected)
         leapt = turn_rad > config.large_turn_rad
         match = self._match(beams, predicted, uncertainty, window, config.search_rad if leapt else 0.0)
+        if not leapt and self._contradicts_wheels(match, predicted):
+            steady = self._match(
+                without_foreground(beams), predicted, odometry_uncertainty(self._pending, config), window
+            )
+            match = steady if steady.accepted else match
         poor = match.quality < config.good_share * self._usual_quality
         self._known = window.known_share(beams, predicted) if poor else 1.0
         # after a leap, what ground lies under the hits is chance; else new ground speaks against no pose
@@ -187,6 +193,12 @@ class Tracker(ABC):
             share = config.quality_memory if self._usual_quality else 1.0
             self._usual_quality += share * (match.quality - self._usual_quality)
         return match
+
+    def _contradicts_wheels(self, match: Match, predicted: Pose) -> bool:
+        """Tell whether a match takes back, or doubles, a good part of the way the wheels have gone."""
+        off_x, off_y, _ = (match.T_grid_base - predicted).tolist()
+        way_m = math.hypot(self._pending[0], self._pending[1])
+        return match.accepted and math.hypot(off_x, off_y) > self.config.doubted_share * way_m > 0.0
 
     def _look_round(
         self, beams: Beams, match: Match, predicted: Pose, wanted: float, *, leapt: bool

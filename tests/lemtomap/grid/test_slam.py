@@ -7,6 +7,7 @@ import pytest
 from lemtomap import se2
 from lemtomap.errors import BadSetting
 from lemtomap.grid import GrowingGmapping, RollingGmapping, SlamConfig, WindowMatcher, particles
+from lemtomap.grid.foreground import is_foreground
 from lemtomap.types import Odometry
 from tests.lemtomap.grid.rooms import box, drive, scan_at
 
@@ -74,6 +75,47 @@ def test_in_a_featureless_corridor_what_the_scan_cannot_see_follows_odometry():
 def test_without_the_diversity_gate_the_corridor_slips_as_appendix_d_says():
     _, error = drive_corridor(replace(SlamConfig(), degenerate_below=0.0))
     assert abs(error[0]) > 0.5
+
+
+def drive_behind_a_person(slam):
+    """A bare corridor, and someone who walks ahead at the robot's own pace."""
+    for i, x in enumerate(np.arange(0.0, 12.0, 0.05)):
+        here, ahead_m = np.array([x, 0.0, 0.0]), x + (1.2 if x > 4.0 else 4.5)
+        person = box(ahead_m, -0.25, ahead_m + 0.3, 0.25)
+        update = slam.update(scan_at(here, [*CORRIDOR, *person], 0.1 * i), Odometry(0.1 * i, here))
+    return update.T_grid_base - here
+
+
+def test_a_person_who_walks_ahead_does_not_hold_the_robot_back():
+    error = drive_behind_a_person(WindowMatcher(SlamConfig()))
+    assert abs(error[0]) < 0.3
+    assert abs(error[1]) < 0.03
+
+
+def test_unless_what_stands_alone_is_heard_against_the_wheels():
+    error = drive_behind_a_person(WindowMatcher(replace(SlamConfig(), doubted_share=math.inf)))
+    assert error[0] < -1.0
+
+
+def test_a_robot_whose_wheels_turn_in_vain_is_told_by_the_walls_that_it_stands():
+    slam = WindowMatcher(SlamConfig())
+    here = np.array([1.0, -1.5, 0.4])
+    for i in range(60):
+        wheels = se2.compose(here, se2.pose(0.02 * i, 0.0, 0.0))
+        update = slam.update(scan_at(here, ROOM, 0.1 * i), Odometry(0.1 * i, wheels))
+    assert math.hypot(*(update.T_grid_base - here)[:2]) < 0.05
+
+
+def test_only_small_things_before_what_is_seen_beside_them_are_foreground():
+    wall = np.column_stack([np.full(40, 3.0), np.linspace(-1.0, 1.0, 40)])
+    person = np.column_stack([np.full(8, 1.5), np.linspace(-0.1, 0.1, 8)])
+    niche = np.column_stack([np.full(8, 4.0), np.linspace(0.4, 0.7, 8)])
+    hits = np.concatenate([wall[:18], person, wall[22:28], niche, wall[34:]])
+    expected = np.zeros(len(hits), dtype=bool)
+    expected[18:26] = True
+    np.testing.assert_array_equal(is_foreground(hits), expected)
+    assert not is_foreground(wall).any()
+    assert is_foreground(np.empty((0, 2))).shape == (0,)
 
 
 def test_after_a_stretch_with_nothing_in_sight_new_walls_are_mapped_where_odometry_says():
