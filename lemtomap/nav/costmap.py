@@ -85,6 +85,10 @@ class Costs:
         return picture.astype(np.uint8)
 
 
+BESIDE = 2  # cells, 0.1 m: a leg is no wider at the camera's height than at the laser's
+AGO_S = 0.5
+
+
 class LiveLayer:
     """Obstacles one sensor saw lately, with the time each was last seen."""
 
@@ -139,11 +143,32 @@ class Costmap:
         if sighting.floor_base is None and len(rays):
             kernels.clear_rays(layer.last_hit_s, layer.hits, start[0], start[1], ends[:, 0], ends[:, 1], 1.5)
         marks, stamp_s = ends[: len(sighting.hits_base)][near[: len(sighting.hits_base)]], sighting.stamp_s
+        if sighting.floor_base is not None:
+            marks = marks[~self._scanned(marks, stamp_s)]
         kernels.mark_hits(layer.last_hit_s, layer.hits, marks[:, 0], marks[:, 1], stamp_s)
         if sighting.floor_base is not None:
             floor = self._cells(se2.transform(T_grid_base, sighting.floor_base))
             cells = np.unique(np.floor(floor).astype(np.int64), axis=0)
             kernels.clear_cells(layer.last_hit_s, layer.hits, cells, stamp_s)
+
+    def _scanned(self, cells: NDArray[np.float64], now_s: float) -> NDArray[np.bool_]:
+        """Tell which cells, float64 (N, 2), the laser has something in or beside, bool (N,).
+
+        It then watches them: what a camera keeps for long is only what the laser overlooks. A person whom
+        both saw is gone when the laser looks through where he stood.
+        """
+        scanned = np.zeros(len(cells), dtype=np.bool_)
+        rows, cols = np.floor(cells).astype(np.int64).T
+        for layer in self._live.values():
+            if not layer.sees_near:
+                continue
+            height, width = layer.hits.shape
+            for r, c in ((r, c) for r in range(-BESIDE, BESIDE + 1) for c in range(-BESIDE, BESIDE + 1)):
+                at = np.clip(rows + r, 0, height - 1), np.clip(cols + c, 0, width - 1)
+                scanned |= (layer.hits[at] >= self._config.live_hits) & (
+                    now_s - layer.last_hit_s[at] <= AGO_S
+                )
+        return scanned
 
     def _layer(self, sighting: Sighting, grid: GridView) -> LiveLayer:
         layer = self._live.get(sighting.source)

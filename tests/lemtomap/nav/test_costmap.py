@@ -92,6 +92,30 @@ def test_recovering_forgets_what_the_laser_sees_again_not_what_lies_below_the_ca
     assert 12 <= lethal(costmap, 0.2) < both
 
 
+def test_a_person_whom_laser_and_camera_saw_leaves_no_ghost_and_a_bar_beside_him_stays():
+    costmap, robot = fresh(), se2.pose(1.0, 3.0, 0.0)
+    across = np.linspace(-0.2, 0.2, 41)
+    legs = np.column_stack([np.full(41, 1.0), across])
+    person = np.column_stack([np.tile(legs, (2, 1)), np.repeat([0.15, 0.3], 41)])
+    bar = np.column_stack([np.full(61, 1.02), np.linspace(0.6, 1.2, 61), np.full(61, 0.1)])
+    for stamp_s in (0.0, 0.2, 0.4):
+        costmap.see(Sighting.from_points(stamp_s, robot, legs), se2.IDENTITY)
+        costmap.see(Sighting.from_cloud(stamp_s, robot, np.concatenate([person, bar])), se2.IDENTITY)
+    costs = costmap.build(0.4, np.empty((0, 2)), (1.0, 3.0))
+    assert costs.state[cell(costs, 2.0, 3.0)] == kernels.LETHAL
+    gone = Sighting(0.6, robot, np.empty((0, 2)), 3.0 * np.column_stack([np.cos(across), np.sin(across)]))
+    for _ in range(4):
+        costmap.see(gone, se2.IDENTITY)
+    costs = costmap.build(0.6, np.empty((0, 2)), (1.0, 3.0))
+    assert costs.state[cell(costs, 2.0, 3.0)] != kernels.LETHAL
+    assert costs.state[cell(costs, 2.02, 3.9)] == kernels.LETHAL
+
+
+def cell(costs, x_m, y_m):
+    row, col = costs.cell((x_m, y_m))
+    return int(row), int(col)
+
+
 def test_live_obstacles_stay_where_they_are_when_the_window_rolls():
     costmap = fresh()
     see(costmap, 0.0, 2.0)
