@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from lemtomap.grid import DEFAULT_SLAM
 from lemtomap.nav.types import Contact, ContactKind, Goal
 from lemtomap.se2 import Pose, between
+from lemtomap.topo.loops.config import MatchConfig
+from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
+from lemtomap.topo.loops.places import Company
 from lemtomap.types import Odometry, Scan
 from robot.bridge import deskewed_sighting
 from robot.build import build_core
@@ -57,8 +60,16 @@ def warm_up(config: RobotConfig, slam: str = DEFAULT_SLAM) -> None:
                 turns = index % NAVIGATES_EACH == 0
                 _live(core, T_world_base, before, SCAN_S * index, navigates=turns, bumped=index == BUMPED_AT)
             core.close()
+    _tell_rivals_apart()
     gc.collect()
     gc.freeze()  # what is loaded now stays: a look through all of it for garbage takes tens of milliseconds
+
+
+def _tell_rivals_apart() -> None:
+    """Hold two pictures against each other: no place of the imagined corridor is like another."""
+    points = np.zeros((1, 2))
+    placed = Placed(picture_of(Company(1, points, points), MatchConfig()), np.zeros(3))
+    told_apart(points, placed, placed)
 
 
 def _there_and_back() -> NDArray[np.float64]:

@@ -1,1 +1,1 @@
-"""What stands round a point, bearing by bearing: how alike two places are, and what changed in one."""
+"""What stands round a point, bearing by bearing, and how alike two such views are."""
