@@ -1,5 +1,6 @@
 """Localisation data over a node's life: taken when best known, compared when seen again, renewed if stale."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -17,6 +18,12 @@ from lemtomap.topo.place import decode_place, encode_place
 from lemtomap.types import GridView
 
 AGEING = 0.7  # of the way a measurement stays fresh: then the place is taken, however near the robot stays
+
+SIDES = 12
+"""Bearings from a node are told apart by 30 degrees."""
+SIDE_POINTS = 3
+UNSEEN_SIDES = 3
+"""A laser that sees 240 degrees leaves four behind it."""
 
 Points = NDArray[np.float64]
 Describe = Callable[[NDArray[np.float64]], bytes]
@@ -83,8 +90,8 @@ class PlaceKeeper:
         taken = []
         for node_id, anyway in self._due.items():
             standing = standings.get(node_id)
-            if standing is not None and standing.anchored and anyway:
-                taken += self._take(node_id, standing, grid, now_s, anyway=True)
+            if standing is not None and standing.anchored:
+                taken += self._take(node_id, standing, grid, now_s, anyway=anyway)
         self._due.clear()
         return taken
 
@@ -103,13 +110,16 @@ class PlaceKeeper:
     def _is_stale(self, node_id: int, standing: Standing, points_node: Points, grid: GridView) -> bool:
         """Compare what surrounds a node now with its data; after several visits that differ, tell so.
 
-        One visit with a person or an open door in view changes nothing.
+        One visit with a person or an open door in view changes nothing; one that shows a side never seen
+        before (behind the robot where the map began) does.
         """
         place, config = self._graph.store.place(node_id), self.config
         if place is None:
             return True
         stored = decode_place(place.boundary).points.astype(np.float64)
         near = points_node[np.hypot(points_node[:, 0], points_node[:, 1]) <= config.place_new_within_m]
+        if _unseen_sides(stored, near) >= UNSEEN_SIDES:
+            return True
         stored_grid = transform(standing.T_grid_node, stored)
         bare = stored[_is_free(stored_grid, grid, config.occupied_from // 2)]
         changes = _without(near, stored, config) + _without(bare, points_node, config)
@@ -148,6 +158,16 @@ def _is_free(points_grid: Points, grid: GridView, free_below: int) -> NDArray[np
     occupancy = np.full(len(cells), -1, dtype=np.int64)
     occupancy[inside] = grid.occupancy[cells[inside, 1], cells[inside, 0]]
     return (occupancy >= 0) & (occupancy < free_below)
+
+
+def _unseen_sides(stored_node: Points, seen_node: Points) -> int:
+    """Count the bearings in which something is seen now and nothing at all is stored."""
+
+    def count(points: Points) -> NDArray[np.int64]:
+        bearing = np.arctan2(points[:, 1], points[:, 0]) / math.tau % 1.0
+        return np.bincount(np.minimum((SIDES * bearing).astype(np.int64), SIDES - 1), minlength=SIDES)
+
+    return int(((count(seen_node) >= SIDE_POINTS) & (count(stored_node) == 0)).sum())
 
 
 def _without(points: Points, others: Points, config: TopoConfig) -> int:

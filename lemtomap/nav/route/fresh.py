@@ -1,4 +1,4 @@
-"""The route graph with the newest nodes: the mapper commits to its file only now and then."""
+"""The route graph with what is newest in the view: the mapper commits to its file only now and then."""
 
 from collections.abc import Sequence
 
@@ -11,16 +11,20 @@ NEWEST = 4
 
 
 class FreshGraph:
-    """A RouteGraph that joins a map view's newborn nodes to the graph on file."""
+    """A RouteGraph that joins a map view's newborn nodes, and new edges at them, to the graph on file.
+
+    A robot that has just been found in the map stands at a node that one new edge alone joins to the rest.
+    """
 
     def __init__(self, graph: RouteGraph, map_view: MapView, usual_speed_mps: float) -> None:
         self._graph = graph
-        newest = sorted(map_view.T_grid_node)[-NEWEST:]
+        newest = {*sorted(map_view.T_grid_node)[-NEWEST:], map_view.associated_id}
         self._newborn = {node_id for node_id in newest if not graph.has_node(node_id)}
+        known = {edge.edge_id for node_id in newest - self._newborn for edge in graph.edges_of(node_id)}
         self._extra: dict[int, list[RouteEdge]] = {}
         self._rows: list[tuple[int, int, int, float, float, float]] = []
-        for edge_id, a, b, _ in map_view.edges if self._newborn else ():
-            if a not in self._newborn and b not in self._newborn:
+        for edge_id, a, b, _ in map_view.edges:
+            if edge_id in known or not (a in newest or b in newest):
                 continue
             length_m = float(np.hypot(*(map_view.T_grid_node[a] - map_view.T_grid_node[b])[:2]))
             self._rows.append((edge_id, a, b, length_m, length_m / usual_speed_mps, 0.0))

@@ -253,7 +253,8 @@ class Locator:
         best, *others = sorted(self.guesses, key=lambda guess: -guess.fit)
         rivals = [other for other in others if not self._same_by_far(best, other)]
         lead = min((best.fit - rival.fit for rival in rivals), default=1.0)
-        if best.match is None or not self._is_sound(best, best.match, view):
+        weakest = self._loops.weakest * (0.5 if lead >= config.margin else 1.0)
+        if best.match is None or not self._is_sound(best, best.match, view, weakest):
             return None
         if not all(self._beats(best, rival, view) for rival in rivals):
             return None
@@ -277,12 +278,16 @@ class Locator:
         company = self.places.company(guess.node_id)
         return None if company is None else Placed(self._picture(company), guess.T_grid_node)
 
-    def _is_sound(self, guess: Guess, match: Match, view: "_View") -> bool:
-        """Tell whether a guess has borne every check of late, on walls that hold it in every direction."""
+    def _is_sound(self, guess: Guess, match: Match, view: "_View", weakest: float) -> bool:
+        """Tell whether a guess has borne every check of late, on walls that hold it in every direction.
+
+        weakest: share of the strongest direction's information on the weakest, at least. Along a corridor
+        little more than door posts hold it; where another place would have fitted, it was a guess as well.
+        """
         return (
             len(guess.fits) >= self.config.checks
             and min(guess.fits[-RECENT:]) >= self.config.fit
-            and match.weakest >= self._loops.weakest
+            and match.weakest >= weakest
             and match.explained * match.known * len(view.points_base) >= self._loops.points
         )
 

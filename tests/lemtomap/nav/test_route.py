@@ -1,5 +1,7 @@
 """Routes: the flat network against plain Dijkstra, and both against what may happen to a graph."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -99,3 +101,13 @@ def test_large_map_on_file_is_planned_in_step_with_its_changes(tmp_path):
         with pytest.raises(NoRoute):
             route()
     store.close()
+
+
+def test_the_closure_that_found_the_robot_joins_the_map_before_it_is_on_file():
+    graph = Graph({1: (0.0, 0.0), 2: (1.0, 0.0), 9: (1.0, 1.0)}, [(100, 1, 2)])
+    world = World(4.0, 4.0, graph)
+    view = world.view(9)
+    with pytest.raises(NoRoute):
+        RoutePlanner(CONFIG).plan(graph, view, 1, 0.0, {})
+    joined = replace(view, edges=[*view.edges, (101, 9, 2, EdgeType.LOOP_CLOSING)])
+    assert RoutePlanner(CONFIG).plan(graph, joined, 1, 0.0, {}).nodes == (9, 2, 1)

@@ -135,6 +135,20 @@ def test_one_glance_at_a_changed_place_renews_nothing_but_visits_in_a_row_do(tmp
     mapper.close()
 
 
+def test_a_side_never_seen_before_is_taken_up_at_once(tmp_path):
+    """Behind the robot where the map began; it comes back facing that way."""
+    mapper = TopoMapper(TopoConfig(), TopoStore.create(tmp_path / "map.lemto"))
+    half = room(walls=[(-5, 1, 6, 1.2), (-5, -1.2, 6, -1)])
+    whole = room(walls=[(-9, 1, 6, 1.2), (-9, -1.2, 6, -1)])
+    stamp = lead(mapper, [(-5, 0), (2, 0)], half)
+    lead(mapper, [(2, 0), (-5, 0)], whole, start_s=stamp)
+    mapper.close()
+    kept = TopoStore.open(tmp_path / "map.lemto")
+    points = decode_place(kept.place(1).boundary).points
+    assert (points[:, 0] < -2.0).any()
+    kept.close()
+
+
 def test_what_was_taken_away_makes_a_place_stale_as_well(tmp_path):
     mapper = TopoMapper(TopoConfig(), TopoStore.create(tmp_path / "map.lemto"))
     full, cleared = (
