@@ -51,12 +51,12 @@ class DwaConfig:
     v_samples: int = 21
     w_samples: int = 51  # odd, so that straight on is among them: 1,071 trajectories
     window_s: float = 0.3  # velocities reachable in this time are tried
-    horizon_s: float = 1.6
+    horizon_s: float = 1.0
     step_s: float = 0.1
     margin_m: float = 0.025  # as the costmap's
     forward_m: float = 0.30  # the way ahead is read this far before the axle; thesis: 0.325
-    clearance_weight: float = 0.25  # metres of way for driving right beside something
-    clearance_falloff_m: float = 0.06
+    dearest: float = 10.0  # a metre inside the margin counts as so many
+    price_share: float = 0.5  # of what the way made cost; with all of it no arc in a narrow place is worth it
     turn_weight: float = 0.02  # metres of way per rad/s: prefer straight of equal choices
     change_weight: float = 0.03  # metres of way per rad/s of change: prefer steady of equal choices
 

@@ -79,11 +79,11 @@ def _choose(
     body_m = min(keep_m, max(TIGHTEST_M, here_m - 0.1 * costs.resolution_m))
     scores = np.empty((vs.size, ws.size))
     best = kernels.score_trajectories(
-        plan.field, costs.clearance, costs.resolution_m, row, col, float(T_grid_base[2]),
+        plan.field, costs.cost, costs.clearance, costs.resolution_m, row, col, float(T_grid_base[2]),
         twist.v_mps, twist.w_radps, vs, ws,
         body.acceleration_mps2, body.braking_mps2, body.turn_acceleration_radps2,
         dwa.horizon_s, dwa.step_s, 0.0 if near else dwa.forward_m, body_m,
-        dwa.clearance_weight, dwa.clearance_falloff_m, dwa.turn_weight, dwa.change_weight,
+        dwa.dearest, dwa.price_share, dwa.turn_weight, dwa.change_weight,
         int(near), scores,
     )  # fmt: skip
     if best < 0:

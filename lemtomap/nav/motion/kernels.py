@@ -31,6 +31,25 @@ def _read(field: F4, row: float, col: float) -> float:
 
 
 @njit(nogil=True, cache=True)
+def _read_ahead(
+    field: F4, cost: F4, dearest: float, price_share: float, row: float, col: float, yaw: float, cells: float
+) -> float:
+    """Value of a field straight ahead and the price of the way to there, less its length, in cells.
+
+    inf where something is in between: it is read round no corner.
+    """
+    height, width = field.shape
+    dr, dc = np.sin(yaw), np.cos(yaw)
+    excess = 0.0
+    for step in range(int(cells)):
+        r, c = int(np.floor(row + dr * (step + 1))), int(np.floor(col + dc * (step + 1)))
+        if r < 0 or c < 0 or r >= height or c >= width or np.isinf(field[r, c]):
+            return np.inf
+        excess += price_share * (min(cost[r, c], dearest) - 1.0)
+    return _read(field, row + dr * cells, col + dc * cells) + excess
+
+
+@njit(nogil=True, cache=True)
 def _approach(value: float, wanted: float, step: float) -> float:
     return min(max(wanted, value - step), value + step)
 
@@ -38,6 +57,7 @@ def _approach(value: float, wanted: float, step: float) -> float:
 @njit(nogil=True, cache=True)
 def score_trajectories(
     field: F4,
+    cost: F4,
     clearance: F4,
     resolution: float,
     row: float,
@@ -54,8 +74,8 @@ def score_trajectories(
     step_s: float,
     forward_m: float,
     body_m: float,
-    clearance_weight: float,
-    clearance_falloff_m: float,
+    dearest: float,
+    price_share: float,
     turn_weight: float,
     change_weight: float,
     ending: int,
@@ -63,9 +83,11 @@ def score_trajectories(
 ) -> int:
     """Write the score of each (v, w): metres of way to go, lower is better; inf where it would collide.
 
-    A trajectory ramps from the present velocity to its own within the limits of acceleration, then holds
-    it. It may meet an obstacle only further off than its braking distance. `ending` 1: the field's target
-    is where to stop, so that a trajectory is as good as its best point. Returns the index of the best, or -1.
+    Of the price of the way made (cost: of a cell of way, dearest at most) the part above its length counts
+    by price_share: what is gained by cutting a corner is paid for along it. A trajectory ramps from the
+    present velocity to its own within the limits of acceleration, then holds it. It may meet an obstacle
+    only further off than its braking distance. `ending` 1: the field's target is where to stop, so that a
+    trajectory is as good as its best point. Returns the index of the best, or -1.
     """
     steps = int(np.ceil(horizon_s / step_s))
     best, best_score = -1, np.inf
@@ -73,7 +95,7 @@ def score_trajectories(
     for i in range(vs.size):
         for j in range(ws.size):
             v, w, r, c, th = v_now, w_now, row, col, yaw
-            length, nearest, crashed = 0.0, 1e9, False
+            length, excess, crashed = 0.0, 0.0, False
             least = np.inf
             for _ in range(steps):
                 rate = acceleration if vs[i] > v else braking
@@ -89,27 +111,23 @@ def score_trajectories(
                 if d < body_m:
                     crashed = True
                     break
-                nearest = min(nearest, d)
                 r, c, th = nr, nc, th + w * step_s
                 length += v * step_s
+                excess += price_share * (min(cost[ri, ci], dearest) - 1.0) * v * step_s
                 if ending == 1:
                     least = min(least, _read(field, r, c))
             if crashed and length < vs[i] * vs[i] / (2.0 * braking) + 0.05 + vs[i] * step_s:
                 scores[i, j] = np.inf
                 continue
-            ahead = _read(
-                field, r + np.sin(th) * forward_m / resolution, c + np.cos(th) * forward_m / resolution
-            )
             here = _read(field, r, c)
+            ahead = _read_ahead(field, cost, dearest, price_share, r, c, th, forward_m / resolution)
             if np.isinf(here):
                 scores[i, j] = np.inf
                 continue
             to_go = min(least, here + 2.0 * forward_m / resolution if np.isinf(ahead) else ahead) * resolution
-            score = to_go + turn_weight * abs(ws[j]) + change_weight * abs(ws[j] - w_now)
+            score = to_go + excess + turn_weight * abs(ws[j]) + change_weight * abs(ws[j] - w_now)
             if ending == 1:
                 score -= 0.3 * vs[i]  # all that pass the target are as good: do not dawdle
-            if nearest < 1e8:
-                score += clearance_weight * np.exp(-(nearest - body_m) / clearance_falloff_m)
             scores[i, j] = score
             if score < best_score:
                 best, best_score = i * ws.size + j, score

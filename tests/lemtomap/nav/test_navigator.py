@@ -44,6 +44,21 @@ def test_drives_through_doorways_without_a_stop_or_a_touch():
     assert (len(outputs) * 0.1) < 1.25 * (9.8 / 0.5)
 
 
+def test_gives_the_post_of_a_door_a_wide_berth():
+    """Arcs that graze the post get furthest; the last check on raw points then stops the robot there."""
+    places = {1: (1.5, 5.0), 2: (1.5, 3.0), 3: (1.5, 2.1), 4: (2.6, 2.0), 5: (4.2, 2.0)}
+    world = World(5.0, 6.0, Graph.of(places, [(1, 2), (2, 3), (3, 4), (4, 5)]), pose=(1.45, 4.8, -1.3))
+    world.box(1.9, 2.5, 2.0, 6.0)
+    world.box(1.9, 0, 2.0, 1.7)
+    nearest_m = []
+    outputs = run(
+        world, Navigator(), 5, 40.0, lambda w: nearest_m.append(np.hypot(*(w.pose[:2] - (1.95, 2.5))))
+    )
+    assert outputs[-1].state == NavState.ARRIVED
+    assert min(nearest_m) > 0.32
+    assert stops_between(outputs) == 0
+
+
 def test_velocity_is_continuous():
     world = two_rooms()
     outputs = run(world, Navigator(), 13, 60.0)
