@@ -269,6 +269,9 @@ def bench_obstacles(name: str, seed: int, count: int, *, depth: bool) -> None:
             drives, total, worst = drives + 2, total + touched, max(worst, touched)
             failed += sum(leg.state != "arrived" for leg in legs)
             thing.pose = NOWHERE
+            if touched:  # nobody tells the robot that it is gone
+                wait_s = rig.core.navigation.navigator.config.costmap.contact_hard_s
+                rig.run(_Pause(wait_s), 2.0 * wait_s)
         rig.close()
     eyes = "with" if depth else "without"
     print(

@@ -41,7 +41,11 @@ class CostmapConfig:
     )
     live_range_m: float = 4.0  # beyond, the window alone is good enough
     contact_radius_m: float = 0.18  # of what was bumped into only one side is known; a chair's foot is wider
-    contact_memory_s: float = 1800.0  # what the laser overlooks cannot be seen to go away
+    contact_hard_s: float = 300.0  # what the laser overlooks cannot be seen to go away: shut this long, ...
+    contact_growth: float = 4.0  # ... so many times as long when it is felt there again, ...
+    contact_memory_s: float = 1800.0  # ... and dear for as long as this
+    contact_price: float = 8.0  # of a metre beside it: a bar is longer than the piece that was touched, ...
+    contact_wide_m: float = 0.35  # ... by this much; it stays open, for there may be no other way
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 Everything lives in the grid frame on the window's own cells and moves along when the window rolls.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,6 +85,18 @@ class Costs:
         return picture.astype(np.uint8)
 
 
+@dataclass(frozen=True, slots=True)
+class Felt:
+    """What was met by touch; float64 (N, 2), metres, grid frame."""
+
+    shut_grid: Points = field(default_factory=lambda: np.empty((0, 2)))
+    """No way there."""
+    dear_grid: Points = field(default_factory=lambda: np.empty((0, 2)))
+    """Around these a wide berth is better, but none is not forbidden."""
+
+
+DEAR_EDGE_M = 0.2
+"""Over this much the price of what lies beside a touched thing falls off."""
 BESIDE = 2  # cells, 0.1 m: a leg is no wider at the camera's height than at the laser's
 AGO_S = 0.5
 
@@ -194,26 +206,27 @@ class Costmap:
     def build(
         self,
         now_s: float,
-        hazards_grid: Points,
         p_robot_grid: ArrayLike,
+        felt: Felt | None = None,
         *,
         tight: bool = False,
         half_m: float | None = None,
     ) -> Costs:
-        """Return the costmap of this moment. hazards_grid: float64 (N, 2), metres, what was met by touch.
+        """Return the costmap of this moment.
 
+        felt: what was met by touch; None: nothing.
         tight: without the margin, for a place that a few noisy cells make too narrow.
         half_m: only the square of twice this side around the robot; what stands outside it near its border is
         felt as well.
         """
-        grid, config = self._grid, self._config
+        grid, config, felt = self._grid, self._config, felt or Felt()
         if grid is None:
             raise RuntimeError("build before follow_window")
         res, felt_m = grid.resolution_m, config.inflation_m + self._body.radius_m
         part = _square(grid, p_robot_grid, None if half_m is None else half_m + felt_m)
         origin_m = grid.origin_m[0] + part[1].start * res, grid.origin_m[1] + part[0].start * res
         state = self._state(grid, part, now_s)
-        for x, y in hazards_grid:
+        for x, y in felt.shut_grid:
             row, col = (y - origin_m[1]) / res, (x - origin_m[0]) / res
             kernels.stamp_disc(state, row, col, config.contact_radius_m / res, kernels.LETHAL)
         clearance = kernels.clearance_transform(state, felt_m / res)
@@ -221,6 +234,10 @@ class Costmap:
         cost = kernels.traversal_cost(
             state, clearance, body, config.near_wall_cost, config.falloff_m / res, config.unknown_factor
         )
+        for x, y in felt.dear_grid:
+            row, col = (y - origin_m[1]) / res, (x - origin_m[0]) / res
+            flat = (self._body.radius_m + config.contact_wide_m) / res
+            kernels.raise_cost(cost, row, col, flat, flat + DEAR_EDGE_M / res, config.contact_price)
         costs = Costs(now_s, res, origin_m, state, clearance, cost)
         row, col = costs.cell(p_robot_grid)
         if costs.holds(p_robot_grid) and np.isinf(cost[int(row), int(col)]):

@@ -94,6 +94,18 @@ def stamp_disc(state: U1, row: float, col: float, radius: float, value: int) -> 
 
 
 @njit(nogil=True, cache=True)
+def raise_cost(cost: F4, row: float, col: float, flat: float, radius: float, price: float) -> None:
+    """Let cells within `flat` cells of (row, col) cost at least `price`, less and less so out to radius."""
+    height, width = cost.shape
+    for r in range(max(0, int(row - radius) - 1), min(height, int(row + radius) + 2)):
+        for c in range(max(0, int(col - radius) - 1), min(width, int(col + radius) + 2)):
+            away = np.hypot(r + 0.5 - row, c + 0.5 - col)
+            if away < radius:
+                share = min(1.0, (radius - away) / (radius - flat))
+                cost[r, c] = max(cost[r, c], price * share)
+
+
+@njit(nogil=True, cache=True)
 def classify(occupancy: I1, occupied_percent: int, state: U1) -> None:
     """Write FREE, UNKNOWN or LETHAL for each cell of an occupancy window (-1 unknown, 0..100)."""
     height, width = occupancy.shape

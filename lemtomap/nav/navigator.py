@@ -87,8 +87,7 @@ class Navigator:
             self._progress.move_goal()
             return
         self._way_back.start_leg()
-        self._way.barriers.reset()
-        self._way.barred_s = None
+        self._way.start_leg()
         self._ladder.reset()
         self._progress.restart(now_s)
 
@@ -160,7 +159,7 @@ class Navigator:
             route = self._way.keep(goal, moment)
             self._look(goal, route, moment)
         except NoRoute as error:
-            return self._no_route(moment, str(error))
+            return self._no_route(goal, moment, str(error))
         if self._way.route is None:  # an edge was closed: look for another way at once
             return self._act(moment)
         if self._goal_is_shut(route, moment):
@@ -201,14 +200,15 @@ class Navigator:
         self._waiting_s = None
         self._progress.restart(now_s)
 
-    def _no_route(self, moment: Moment, text: str) -> NavOutput:
+    def _no_route(self, goal: Goal, moment: Moment, text: str) -> NavOutput:
         """Refuse, unless what bars the way came just now and may go again, or is seen to be gone."""
         barred_s, patience_s = self._way.barred_s, self.config.recovery.barred_patience_s
         if self.lookout.is_due(moment.now_s):
             costs = self.surroundings.costs(moment.map_view, moment.T_grid_base, moment.now_s)
-            if self._way.reopen(reach_from(costs, moment.T_grid_base), moment):
+            reach = reach_from(costs, moment.T_grid_base)
+            if self._way.reopen(reach, moment) or self._way.begin_elsewhere(goal, reach, moment):
                 barred_s = moment.now_s
-        if barred_s is None or moment.now_s - barred_s > patience_s:
+        if (barred_s is None or moment.now_s - barred_s > patience_s) and not self._way.retry(moment):
             return self._fail(moment, Reason.NO_ROUTE, text)
         self._start_over(moment.now_s)
         twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
@@ -326,6 +326,8 @@ class Navigator:
         name = self._ladder.name
         self._progress.grace(moment.now_s)
         twist = approach(moment.twist, wanted, self.config.body, self.config.period_s)
+        if wanted.v_mps < 0.0:
+            twist = replace(twist, v_mps=min(twist.v_mps, 0.0))  # no braking distance into what was touched
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
         twist = limit_twist(twist, points, self.config.body)
         return self._output(moment, twist, NavState.RECOVERING, Reason.OBSTACLE, name)

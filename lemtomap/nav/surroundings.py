@@ -1,5 +1,6 @@
 """What navigation believes stands around the robot: the costmap, the sensors' memories, touched hazards."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -8,7 +9,7 @@ import numpy as np
 
 from lemtomap import se2
 from lemtomap.nav.config import NavConfig
-from lemtomap.nav.costmap import Costmap, Costs
+from lemtomap.nav.costmap import Costmap, Costs, Felt
 from lemtomap.nav.motion.collision import points_now
 from lemtomap.nav.types import Contact, ContactKind, Points, Sighting
 from lemtomap.se2 import Pose
@@ -20,6 +21,8 @@ FRESH_S = 0.6
 """Range points older than this say nothing about what is in front of the body now."""
 HOLD_M = 0.9
 SAME_M = 0.05
+AGAIN_S = 30.0
+"""What is felt again after so long was not gone when its mark was forgotten."""
 ASIDE_M = (-0.25, 0.0, 0.25)
 """A Kobuki's bumper tells one of three directions and nothing of how wide the thing is. What is overlooked
 is a bar or a chair's foot: this much to both sides of the touch, and the mark's own radius, covers it."""
@@ -40,7 +43,10 @@ class Hazard:
 
     node_id: int
     p_node: tuple[float, float]
+    kind: ContactKind
     stamp_s: float
+    shut_s: float
+    """How long no way leads there: stairs do not move, a chair may."""
 
 
 class Surroundings:
@@ -62,7 +68,9 @@ class Surroundings:
         """Take over, once, what earlier drives felt, if the graph keeps it."""
         if not self._recalled and isinstance(graph, RemembersMarks):
             for mark in graph.marks():
-                self._keep(Hazard(mark.node_id, (mark.x_m, mark.y_m), now_s))
+                kind = ContactKind(mark.kind)
+                shut_s = math.inf if kind is ContactKind.CLIFF else 0.0
+                self._keep(Hazard(mark.node_id, (mark.x_m, mark.y_m), kind, now_s, shut_s))
         self._recalled = True
 
     def take(self, map_view: MapView, sightings: Sequence[Sighting]) -> None:
@@ -82,10 +90,32 @@ class Surroundings:
         p_base = np.stack([reach_m * along - aside * across, reach_m * across + aside * along], axis=-1)
         T_grid_node = map_view.T_grid_node.get(map_view.associated_id)
         if T_grid_node is not None:
+            shut_s = self._shut_s(contact, map_view, se2.transform(T_grid_base, p_base))
             for x, y in se2.transform(se2.between(T_grid_node, T_grid_base), p_base):
-                self._keep(Hazard(map_view.associated_id, (float(x), float(y)), contact.stamp_s))
+                p_node = float(x), float(y)
+                self._keep(Hazard(map_view.associated_id, p_node, contact.kind, contact.stamp_s, shut_s))
         x, y = p_base[len(p_base) // 2]
         return Bumped(contact.kind.value, float(x), float(y), contact.stamp_s)
+
+    def _shut_s(self, contact: Contact, map_view: MapView, p_grid: Points) -> float:
+        """Return for how long what was felt now at points (N, 2) shuts its place."""
+        if contact.kind is ContactKind.CLIFF:
+            return math.inf
+        config, longest_s = self._config.costmap, 0.0
+        for hazard, place in self._placed(map_view):
+            again = contact.stamp_s - hazard.stamp_s > AGAIN_S
+            if again and np.hypot(*(p_grid - place).T).min() < config.contact_radius_m:
+                longest_s = max(longest_s, hazard.shut_s)
+        return min(max(config.contact_hard_s, config.contact_growth * longest_s), config.contact_memory_s)
+
+    def _placed(self, map_view: MapView) -> list[tuple[Hazard, Points]]:
+        """Return the hazards in the window and where they are, float64 (2,), metres, grid frame."""
+        places = map_view.T_grid_node
+        return [
+            (hazard, se2.transform(places[hazard.node_id], hazard.p_node))
+            for hazard in self._hazards
+            if hazard.node_id in places
+        ]
 
     def _keep(self, hazard: Hazard) -> None:
         """Add a hazard, or renew the one it repeats."""
@@ -110,14 +140,14 @@ class Surroundings:
         half_m: only so far around the robot; None: the whole window.
         """
         memory_s = self._config.costmap.contact_memory_s
-        self._hazards = [hazard for hazard in self._hazards if now_s - hazard.stamp_s < memory_s]
-        placed = [
-            se2.transform(map_view.T_grid_node[hazard.node_id], hazard.p_node)
-            for hazard in self._hazards
-            if hazard.node_id in map_view.T_grid_node
+        self._hazards = [
+            hazard for hazard in self._hazards if now_s - hazard.stamp_s < max(memory_s, hazard.shut_s)
         ]
-        hazards_grid: Points = np.array(placed).reshape(-1, 2)
-        return self._costmap.build(now_s, hazards_grid, T_grid_base[:2], tight=tight, half_m=half_m)
+        placed = self._placed(map_view)
+        shut = [place for hazard, place in placed if now_s - hazard.stamp_s < hazard.shut_s]
+        dear = [place for hazard, place in placed if hazard.kind is ContactKind.BUMPER]
+        felt = Felt(np.array(shut).reshape(-1, 2), np.array(dear).reshape(-1, 2))
+        return self._costmap.build(now_s, T_grid_base[:2], felt, tight=tight, half_m=half_m)
 
     def points(self, T_odom_base: Pose, now_s: float) -> Points:
         """Return the raw range points near the body, present base frame, float64 (N, 2)."""

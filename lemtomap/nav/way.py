@@ -1,16 +1,17 @@
 """The route under way: planned, kept while it holds, and planned around edges that prove closed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from lemtomap.errors import NoRoute
 from lemtomap.nav.barriers import find_barrier, find_detour
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.metric import MetricPlan, Reach
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.planning import RoutePlanner
-from lemtomap.nav.sliding import BORDER_M, Target
+from lemtomap.nav.sliding import BORDER_M, SNAP_M, Target
 from lemtomap.nav.types import Goal
 from lemtomap.nav.watching import BarrierWatch, Link, links_cut, links_open_again
 from lemtomap.se2 import Pose
@@ -19,6 +20,9 @@ from lemtomap.types import MapView, RouteGraph, Twist
 
 NEAR_BARRIER_M = 1.0
 SEEN_FREE_TIMES = 2
+STARTS_TRIED = 12
+BESIDE_M = 8.0
+"""Nodes this near may stand in for the associated one."""
 SHUT_IN_M2 = 1.0
 """A robot that can reach less floor than this is held by a chair or by noise, not by a closed door."""
 
@@ -36,6 +40,15 @@ class Moment:
     events: list[NavEvent] = field(default_factory=list)
 
 
+@dataclass(frozen=True, slots=True)
+class Closing:
+    """How often an edge was closed of late, and when last."""
+
+    count: int
+    stamp_s: float
+    link: Link
+
+
 class WayKeeper:
     """Holds the route to one goal and which edges are closed; closed edges outlive the goal."""
 
@@ -44,27 +57,60 @@ class WayKeeper:
         self._planner = RoutePlanner(config.route)
         self._version: int | None = None
         self._closed_s: dict[int, float] = {}
-        self._closings: dict[int, tuple[int, float]] = {}
-        """How often an edge was closed of late, and when last."""
+        self._closings: dict[int, Closing] = {}
         self.route: Route | None = None
         """None: to be planned anew."""
         self.barred_s: float | None = None
         """When the way under way was barred last, or seen to open again; None: not since the goal was set."""
         self.barriers = BarrierWatch(config.recovery)
+        self._retried = False
+        self._instead: tuple[int, int] | None = None
+        """The associated node and the one to begin from as long as that is it."""
+        self._sought_s = -np.inf
+
+    def start_leg(self) -> None:
+        """There is a new goal."""
+        self.barriers.reset()
+        self.barred_s, self._retried, self._instead, self._sought_s = None, False, None, -np.inf
 
     def keep(self, goal: Goal, moment: Moment) -> Route:
         """Return the route from the associated node, planned anew only when the map or the way changed.
 
         Raises NoRoute with the reason.
         """
-        graph, here = moment.graph, moment.map_view.associated_id
-        if self.route is not None and self._version == graph.version and here in self.route.nodes:
+        here = moment.map_view.associated_id
+        if self._instead is not None and self._instead[0] == here:
+            here = self._instead[1]
+        if self.route is not None and self._version == moment.graph.version and here in self.route.nodes:
             self.route = self.route.since(here)
             return self.route
         self._closed_s = {edge: until for edge, until in self._closed_s.items() if until > moment.now_s}
-        self.route = self._planner.plan(graph, moment.map_view, goal.node_id, moment.now_s, self._closed_s)
-        self._version = graph.version
+        self.route = self._plan_from(here, goal, moment)
         return self.route
+
+    def begin_elsewhere(self, goal: Goal, reach: Reach, moment: Moment) -> bool:
+        """Plan from another node that the window shows a way to, if the associated one has none.
+
+        What was bumped into may stand on a node: all its edges are cut, though there is room to pass.
+        """
+        here = moment.map_view.associated_id
+        tried = self._instead is not None and self._instead[0] == here
+        if tried or moment.now_s - self._sought_s < self._config.look_period_s:
+            return False
+        self._sought_s = moment.now_s
+        for node_id in _in_reach(moment.map_view, reach, moment.T_grid_base)[:STARTS_TRIED]:
+            try:
+                self.route = self._plan_from(node_id, goal, moment)
+            except NoRoute:
+                continue
+            self._instead = here, node_id
+            return True
+        return False
+
+    def _plan_from(self, node_id: int, goal: Goal, moment: Moment) -> Route:
+        view = replace(moment.map_view, associated_id=node_id)
+        self._version = moment.graph.version
+        return self._planner.plan(moment.graph, view, goal.node_id, moment.now_s, self._closed_s)
 
     def check(
         self, goal: Goal, target: Target | None, plan: MetricPlan | None, reach: Reach, moment: Moment
@@ -102,13 +148,34 @@ class WayKeeper:
 
         One that proved closed again and again, though it had been seen free, waits for its time.
         """
-        believed = [e for e in self._closed_s if self._closings.get(e, (0, 0.0))[0] <= SEEN_FREE_TIMES]
-        links = links_open_again(believed, moment.map_view, reach)
+        often = {e for e, closing in self._closings.items() if closing.count > SEEN_FREE_TIMES}
+        links = links_open_again(self._closed_s.keys() - often, moment.map_view, reach)
+        self._open(links, moment)
+        return bool(links)
+
+    def retry(self, moment: Moment) -> bool:
+        """Open, once for a goal, what was closed a while ago: a second look is better than to refuse.
+
+        False when there is nothing of the kind.
+        """
+        before_s = moment.now_s - self._config.recovery.block_s
+        old = [
+            closing.link
+            for e, closing in self._closings.items()
+            if e in self._closed_s and closing.stamp_s < before_s
+        ]
+        if self._retried or not old:
+            return False
+        self._retried = True
+        self._open(old, moment)
+        return True
+
+    def _open(self, links: Sequence[Link], moment: Moment) -> None:
+        """Plan over these edges again, and tell the map."""
         for edge_id, a, b in links:
             del self._closed_s[edge_id]
             moment.events.append(EdgeBlocked(a, b, 0.0))
             self.barred_s = moment.now_s  # the map will hear of it in a moment
-        return bool(links)
 
     def close_next(self, moment: Moment) -> bool:
         """Close the first edge of the route; False when there is none."""
@@ -135,23 +202,35 @@ class WayKeeper:
     def _close(self, links: Sequence[Link], moment: Moment) -> None:
         """Plan around these edges from now on, and tell the map."""
         longest_s = self._config.recovery.block_longest_s
-        self._closings = {e: c for e, c in self._closings.items() if moment.now_s - c[1] < longest_s}
-        for edge_id, a, b in {link[0]: link for link in links}.values():
-            until_s = self._closed_s[edge_id] = moment.now_s + self._block_s(edge_id, moment.now_s)
+        self._closings = {e: c for e, c in self._closings.items() if moment.now_s - c.stamp_s < longest_s}
+        for link in {link[0]: link for link in links}.values():
+            edge_id, a, b = link
+            until_s = self._closed_s[edge_id] = moment.now_s + self._block_s(link, moment.now_s)
             moment.events.append(EdgeBlocked(a, b, until_s))
         self.barred_s = moment.now_s
         self.route = None
         self.barriers.reset()
 
-    def _block_s(self, edge_id: int, now_s: float) -> float:
+    def _block_s(self, link: Link, now_s: float) -> float:
         """Return how long an edge is to be closed: each time longer, else two closed ways that open again
         while the robot is at the other one send it to and fro for ever.
 
         Found cut while it is closed, it was not closed again: one barrier is met from several edges.
         """
-        recovery = self._config.recovery
-        before, _ = self._closings.get(edge_id, (0, now_s))
+        recovery, edge_id = self._config.recovery, link[0]
+        before = self._closings[edge_id].count if edge_id in self._closings else 0
         if before and self._closed_s.get(edge_id, 0.0) > now_s:
             before -= 1
-        self._closings[edge_id] = (before + 1, now_s)
+        self._closings[edge_id] = Closing(before + 1, now_s, link)
         return min(recovery.block_s * recovery.block_growth**before, recovery.block_longest_s)
+
+
+def _in_reach(map_view: MapView, reach: Reach, T_grid_base: Pose) -> list[int]:
+    """Return the nodes beside the robot that it can get to over seen floor, nearest first."""
+    away_m = {
+        node_id: float(np.hypot(*(T_grid_node - T_grid_base)[:2]))
+        for node_id, T_grid_node in map_view.T_grid_node.items()
+    }
+    near = (node_id for node_id in sorted(away_m, key=away_m.__getitem__) if away_m[node_id] <= BESIDE_M)
+    found = ((node_id, reach.nearest(map_view.T_grid_node[node_id], SNAP_M)) for node_id in near)
+    return [node_id for node_id, cell in found if cell is not None and cell[2] == 1]

@@ -203,7 +203,7 @@ class MetricNavigation(Part):
         if frame.grid is not None:
             costmap = self._new_costmap(self._config.costmap, self._config.body)
             costmap.follow_window(frame.grid)
-            self._whole = costmap.build(frame.drive_s, np.empty((0, 2)), update.T_grid_base[:2])
+            self._whole = costmap.build(frame.drive_s, update.T_grid_base[:2])
             self._window = Window(frame.grid)
         if self._window is None:
             return None

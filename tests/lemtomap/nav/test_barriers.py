@@ -22,7 +22,7 @@ def barrier(world):
     config = NavConfig()
     costmap = Costmap(config.costmap, config.body)
     costmap.follow_window(world.view().grid)
-    reach = reach_from(costmap.build(world.now_s, np.empty((0, 2)), world.pose[:2]), world.pose)
+    reach = reach_from(costmap.build(world.now_s, world.pose[:2]), world.pose)
     places = {1: np.array([*BELOW, 0.0]), 2: np.array([*ABOVE, 0.0])}
     return find_barrier(ROUTE, places, reach, 0)
 

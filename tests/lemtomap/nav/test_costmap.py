@@ -28,7 +28,7 @@ def see(costmap: Costmap, stamp_s: float, range_m: float) -> None:
 
 
 def lethal(costmap: Costmap, now_s: float) -> int:
-    costs = costmap.build(now_s, np.empty((0, 2)), (1.0, 3.0))
+    costs = costmap.build(now_s, (1.0, 3.0))
     return int((costs.state == kernels.LETHAL).sum())
 
 
@@ -62,7 +62,7 @@ def test_open_space_clears_and_nan_does_not():
         before = lethal(costmap, 0.1)
         see(costmap, 0.2, value)
         see(costmap, 0.3, value)
-        left = costmap.build(0.3, np.empty((0, 2)), (1.0, 3.0)).state[:, :65] == kernels.LETHAL
+        left = costmap.build(0.3, (1.0, 3.0)).state[:, :65] == kernels.LETHAL
         assert (int(left.sum()) < before / 10) == cleared, value
 
 
@@ -101,12 +101,12 @@ def test_a_person_whom_laser_and_camera_saw_leaves_no_ghost_and_a_bar_beside_him
     for stamp_s in (0.0, 0.2, 0.4):
         costmap.see(Sighting.from_points(stamp_s, robot, legs), se2.IDENTITY)
         costmap.see(Sighting.from_cloud(stamp_s, robot, np.concatenate([person, bar])), se2.IDENTITY)
-    costs = costmap.build(0.4, np.empty((0, 2)), (1.0, 3.0))
+    costs = costmap.build(0.4, (1.0, 3.0))
     assert costs.state[cell(costs, 2.0, 3.0)] == kernels.LETHAL
     gone = Sighting(0.6, robot, np.empty((0, 2)), 3.0 * np.column_stack([np.cos(across), np.sin(across)]))
     for _ in range(4):
         costmap.see(gone, se2.IDENTITY)
-    costs = costmap.build(0.6, np.empty((0, 2)), (1.0, 3.0))
+    costs = costmap.build(0.6, (1.0, 3.0))
     assert costs.state[cell(costs, 2.0, 3.0)] != kernels.LETHAL
     assert costs.state[cell(costs, 2.02, 3.9)] == kernels.LETHAL
 
@@ -120,10 +120,10 @@ def test_live_obstacles_stay_where_they_are_when_the_window_rolls():
     costmap = fresh()
     see(costmap, 0.0, 2.0)
     see(costmap, 0.1, 2.0)
-    before = costmap.build(0.1, np.empty((0, 2)), (1.0, 3.0))
+    before = costmap.build(0.1, (1.0, 3.0))
     rows, cols = np.nonzero(before.state == kernels.LETHAL)
     costmap.follow_window(window((0.5, -0.25)))
-    after = costmap.build(0.1, np.empty((0, 2)), (1.0, 3.0))
+    after = costmap.build(0.1, (1.0, 3.0))
     assert (after.state[rows + 5, cols - 10] == kernels.LETHAL).all()
 
 

@@ -126,7 +126,7 @@ def test_pictures_of_the_ground_far_from_the_robot_are_with_the_map():
     world.known[:] = True
     costmap = Costmap(NavConfig().costmap, NavConfig().body)
     costmap.follow_window(world.view().grid)
-    costs = costmap.build(world.now_s, np.empty((0, 2)), world.pose[:2])
+    costs = costmap.build(world.now_s, world.pose[:2])
     memory, graph = SeenMemory(kept=5), Keeping({}, [])
     places = {k: np.array([1.0 + 0.1 * k, 4.0, 0.1 * k]) for k in range(100)}
     for k, place in places.items():
@@ -136,7 +136,7 @@ def test_pictures_of_the_ground_far_from_the_robot_are_with_the_map():
     assert len(graph.pictures) == 99  # all but that of the node it is at
     world.known[:] = False
     costmap.follow_window(world.view().grid)
-    unknown = costmap.build(world.now_s, np.empty((0, 2)), world.pose[:2])
+    unknown = costmap.build(world.now_s, world.pose[:2])
     assert memory.recall(unknown, graph).sum() > SeenMemory().recall(unknown).sum() + 1000
 
 

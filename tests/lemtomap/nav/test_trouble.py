@@ -14,7 +14,7 @@ from lemtomap.nav.way import Moment, WayKeeper
 from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed
 from lemtomap.types import RouteEdge, Twist
 from tests.lemtomap.nav.test_navigator import two_rooms
-from tests.lemtomap.nav.world import run
+from tests.lemtomap.nav.world import Graph, World, run
 
 
 def shut(world, x0: float, x1: float) -> None:
@@ -118,6 +118,44 @@ def test_refuses_with_the_reason_when_no_way_is_left():
     assert "closed" in outputs[-1].text
     assert world.contacts == 0
     assert run(world, navigator, 3, 30.0)[-1].state == NavState.ARRIVED
+
+
+def test_a_way_closed_again_and_again_is_looked_at_once_more_before_a_new_goal_is_refused():
+    world = two_rooms()
+    shut(world, 6.55, 7.45)
+    shut(world, 1.75, 2.65)
+    navigator = Navigator()
+    for _ in range(3):
+        assert run(world, navigator, 9, 90.0)[-1].state == NavState.FAILED
+        world.now_s += 1.1 * RecoveryConfig().block_s * RecoveryConfig().block_growth
+    closed_until_s = max(world.now_s, *navigator._way._closed_s.values())
+    world.box(6.55, 2.0, 7.45, 2.15, value=False)
+    assert closed_until_s > world.now_s + 100.0, "else nothing is shown"
+    assert run(world, navigator, 9, 90.0)[-1].state == NavState.ARRIVED
+
+
+def test_a_node_that_something_stands_on_does_not_close_the_corridor():
+    places = {1: (1.0, 1.0), 2: (2.5, 1.0), 3: (4.0, 1.0), 4: (5.5, 1.0), 5: (7.0, 1.0)}
+    world = World(8.0, 2.4, Graph.of(places, list(pairwise(places))))
+    world.box(3.7, 0, 3.9, 2.4)  # all across: the edges are closed
+    navigator = Navigator()
+    assert run(world, navigator, 5, 90.0)[-1].state == NavState.FAILED
+    world.box(3.7, 1.5, 3.9, 2.3, value=False)  # what is left of it still stands on the edge
+    for _ in range(5):
+        navigator.step(
+            world.view(), world.graph, world.T_odom_base, world.twist, world.sighting(), (), world.now_s
+        )
+        world.drive(Twist())
+    assert run(world, navigator, 5, 30.0)[-1].state == NavState.ARRIVED
+    assert world.contacts == 0
+
+
+def test_a_bump_is_left_backwards_at_once():
+    world = two_rooms()
+    world.hidden[18:23, 70:75] = True
+    outputs = drive_blind(world, Navigator(), 6, 20.0)
+    bumped = next(i for i, o in enumerate(outputs) if any(isinstance(e, Bumped) for e in o.events))
+    assert all(o.twist.v_mps <= 0.0 for o in outputs[bumped : bumped + 10])
 
 
 def close_through_walls(world) -> None:
