@@ -15,6 +15,7 @@ from sim.world import Raster
 CELL_M = 0.10  # planning step; finer rasters are thinned
 KEEP_OFF_M = 0.27  # body radius 0.178 m and 9 cm to spare
 LIKE_OFF_M = 0.60  # nearer than this costs more, so that tours keep to the middle
+PULLED_M = 20.0  # a grid's way has eight directions; over this length it is pulled straight
 ROOF_REACH_M = 25.0
 FIRST_LIMIT, MOST_COST = 2.0, 2000.0  # the search ends at twice the straight line, then goes on further
 
@@ -31,10 +32,12 @@ class RoutePlanner:
         self._index = np.full(self.passable.shape, -1, dtype=np.int64)
         self._index[self.passable] = np.arange(int(self.passable.sum()))
         self._cells = np.argwhere(self.passable)
-        self._graph = self._build(clearance)
+        self._cost = 1.0 + 4.0 * np.maximum(0.0, LIKE_OFF_M - clearance) / LIKE_OFF_M
+        self._cost[~self.passable] = np.inf
+        self._graph = self._build()
 
-    def _build(self, clearance: NDArray[np.float64]) -> sparse.csr_matrix:
-        cost = 1.0 + 4.0 * np.maximum(0.0, LIKE_OFF_M - clearance) / LIKE_OFF_M
+    def _build(self) -> sparse.csr_matrix:
+        cost = self._cost
         rows, cols = self.passable.shape
         sources, targets, weights = [], [], []
         for dr, dc in ((0, 1), (1, 0), (1, 1), (1, -1)):
@@ -87,8 +90,37 @@ class RoutePlanner:
         cells = [cell]
         while before[cells[-1]] >= 0:
             cells.append(int(before[cells[-1]]))
-        points = np.array([self.point(number) for number in reversed(cells)])
-        return _smooth(points)
+        way = np.array(cells[::-1])
+        return _smooth(self._pulled(self._cells[way], cost[way]))
+
+    def _pulled(self, cells: NDArray[np.int64], cost: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return points a step apart along a way of cells, straight where that costs no more: as people walk.
+
+        cells: int64 (N, 2), cost: float64 (N,), from the way's start to each.
+        """
+        at, last, most = 0, len(cells) - 1, round(PULLED_M / self._step_m)
+        parts = [cells[:1].astype(np.float64)]
+        while at < last:
+            to = next(
+                (
+                    to
+                    for to in range(min(at + most, last), at + 1, -4)
+                    if self._is_as_good(cells, cost, at, to)
+                ),
+                at + 1,
+            )
+            parts.append(_between(cells[at], cells[to])[1:])
+            at = to
+        row_cols = np.concatenate(parts) * self._stride
+        return np.array([self._raster.point(row, col) for row, col in row_cols])
+
+    def _is_as_good(self, cells: NDArray[np.int64], cost: NDArray[np.float64], at: int, to: int) -> bool:
+        """Tell whether the straight line costs no more than the way between two of its cells."""
+        line = _between(cells[at], cells[to])
+        rows, cols = np.rint(line).astype(np.int64).T
+        step_m = float(np.hypot(*(cells[to] - cells[at]))) / (len(line) - 1) * self._step_m
+        prices = self._cost[rows, cols]
+        return bool(step_m * 0.5 * (prices[1:] + prices[:-1]).sum() <= cost[to] - cost[at] + 1e-9)
 
     def through(self, waypoints: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
         """Return one path through all waypoints in order."""
@@ -115,6 +147,11 @@ class RoutePlanner:
                 chosen.append((float(x), float(y)))
                 open_ &= np.hypot(points[:, 0] - x, points[:, 1] - y) >= spacing_m
         return chosen
+
+
+def _between(a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return cells from a to b on the straight line, about one apart, float64 (N, 2)."""
+    return np.linspace(a, b, max(2, round(float(np.hypot(*(b - a)))) + 1))
 
 
 def _smooth(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from sim.errors import BadWorld
 from sim.route import RoutePlanner
 from sim.simulator import Simulator
 from sim.tours import base_command, drive, plan_errand, plan_tour
+from sim.world import Raster
 
 
 @pytest.fixture(scope="module")
@@ -71,3 +72,13 @@ def test_errand_goes_there_and_back_twice(office):
 )
 def test_commands_match_the_worked_frames(v, w, frame):
     assert base_command(v, w).hex().upper() == frame
+
+
+def test_a_way_through_the_open_is_straight():
+    occupied = np.zeros((240, 240), dtype=bool)
+    occupied[[0, -1]] = occupied[:, [0, -1]] = True
+    planner = RoutePlanner(Raster(occupied, ~occupied, 0.05, (0.0, 0.0)))
+    path = planner.path((1.0, 1.0), (9.0, 5.0))
+    length_m = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    assert length_m < 1.02 * np.hypot(8.0, 4.0), "eight directions make it 1.06 times as long"
+    assert np.hypot(*np.diff(path, axis=0).T).max() < 0.2
