@@ -81,6 +81,11 @@ class RollingGmapping(Tracker):
         self._choose_and_resample()
         return self._particles[self._best].T_grid_base
 
+    def _follow(self, beams: Beams) -> None:
+        for particle in self._particles:
+            self._own_window(particle)
+            roll_and_integrate(particle.window, beams, compose(particle.T_grid_base, self._pending))
+
     def _move_and_weigh(self, beams: Beams, tracked: Match) -> None:
         """Draw each pose from its proposal and weigh it by how well the scan fits its window (lines 7-16).
 

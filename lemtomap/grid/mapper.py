@@ -92,6 +92,10 @@ class Tracker(ABC):
     def _integrate(self, beams: Beams, match: Match | None) -> Pose:
         """Put the scan into the window(s); return the best pose now."""
 
+    @abstractmethod
+    def _follow(self, beams: Beams) -> None:
+        """Put a scan without hits into the window(s) where odometry has taken them since the last match."""
+
     # -- GridSlam
     # --------------------------------------------------------------------------------------------------
 
@@ -112,14 +116,16 @@ class Tracker(ABC):
             return self._report(predicted, matched=False, integrated=False)
         match = self._track(beams, predicted, abs(float(step[2])))
         self._quality, self._diversity, self._covariance = match.quality, match.diversity, match.covariance
+        if len(beams.hits) == 0:
+            return self._report(predicted, matched=False, integrated=self._see_floor(beams, predicted))
         if not match.accepted:
-            if len(beams.hits) == 0 or self._known > self.config.new_ground_below:
+            if self._known > self.config.new_ground_below:
                 return self._report(predicted, matched=False, integrated=False)
             match = refused(predicted, odometry_uncertainty(self._pending, self.config))
         self._moves = self._is_motion(between(self._T_grid_base, match.T_grid_base))
         self._T_grid_base, self._information = match.T_grid_base, match.information
         self._pending = np.zeros(3)
-        integrated = self._is_due_to_integrate(scan.stamp_s)
+        integrated = self._is_due_to_integrate(self._T_grid_base, scan.stamp_s)
         if integrated:
             self._T_grid_base = self._integrate(beams, match)
             self._T_grid_integrated, self._integrated_s = self._T_grid_base, scan.stamp_s
@@ -155,9 +161,19 @@ class Tracker(ABC):
         x, y, yaw = step.tolist()
         return math.hypot(x, y) >= self.config.match_distance_m or abs(yaw) >= self.config.match_turn_rad
 
-    def _is_due_to_integrate(self, stamp_s: float) -> bool:
-        assert self._T_grid_base is not None  # noqa: S101
-        way = self._T_grid_base - self._T_grid_integrated
+    def _see_floor(self, beams: Beams, predicted: Pose) -> bool:
+        """Let the window go along where the laser meets nothing; tell whether it did now.
+
+        What odometry adds up to until walls are met again stays pending: the first match looks that far.
+        """
+        if not self._is_due_to_integrate(predicted, self._stamp_s):
+            return False
+        self._follow(beams)
+        self._T_grid_integrated, self._integrated_s = predicted, self._stamp_s
+        return True
+
+    def _is_due_to_integrate(self, T_grid_base: Pose, stamp_s: float) -> bool:
+        way = T_grid_base - self._T_grid_integrated
         return (
             math.hypot(way[0], way[1]) >= self.config.integrate_distance_m
             or abs(float(wrap_angle(way[2]))) >= self.config.integrate_turn_rad
@@ -269,6 +285,10 @@ class WindowMatcher(Tracker):
         assert self._T_grid_base is not None  # noqa: S101
         roll_and_integrate(self._only, beams, self._T_grid_base)
         return self._T_grid_base
+
+    def _follow(self, beams: Beams) -> None:
+        assert self._T_grid_base is not None  # noqa: S101
+        roll_and_integrate(self._only, beams, compose(self._T_grid_base, self._pending))
 
 
 def roll_and_integrate(window: Window, beams: Beams, T_grid_base: Pose) -> None:

@@ -8,7 +8,7 @@ from lemtomap import se2
 from lemtomap.errors import BadSetting
 from lemtomap.grid import GrowingGmapping, RollingGmapping, SlamConfig, WindowMatcher, particles
 from lemtomap.grid.foreground import is_foreground
-from lemtomap.types import Odometry
+from lemtomap.types import Odometry, Scan
 from tests.lemtomap.grid.rooms import box, drive, scan_at
 
 ROOM = [*box(-4.0, -3.0, 4.0, 3.0), *box(1.0, 0.5, 1.8, 1.1), *box(-3.2, 1.5, -2.6, 3.0)]
@@ -212,6 +212,19 @@ def test_window_smaller_than_twice_the_range_is_refused():
         SlamConfig(window_m=10.0, max_range_m=5.6)
     assert SlamConfig(window_m=10.0).usable_range_m(30.0) == 5.0
     assert SlamConfig().usable_range_m(5.6) == 5.6
+
+
+@pytest.mark.parametrize("kind", [WindowMatcher, RollingGmapping])
+def test_the_window_goes_along_where_the_laser_meets_nothing(kind):
+    """It stayed behind in a hall wider than the laser sees, and the navigator stood at its border."""
+    slam = kind(SlamConfig())
+    for index in range(300):
+        pose = np.array([0.1 * index, 0.0, 0.0])
+        scan = Scan(0.1 * index, np.full(61, np.inf, dtype=np.float32), -1.5, 0.05, silent_free_m=2.5)
+        slam.update(scan, Odometry(0.1 * index, pose))
+    view = slam.view()
+    col, row = np.floor((np.array([29.9, 0.0]) - view.origin_m) / view.resolution_m).astype(int)
+    assert 0 <= view.occupancy[row, col] < 25
 
 
 def test_a_blind_laser_follows_odometry():
