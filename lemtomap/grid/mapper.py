@@ -190,10 +190,7 @@ class Tracker(ABC):
         leapt = turn_rad > config.large_turn_rad
         match = self._match(beams, predicted, uncertainty, window, config.search_rad if leapt else 0.0)
         if not leapt and self._contradicts_wheels(match, predicted):
-            steady = self._match(
-                without_foreground(beams), predicted, odometry_uncertainty(self._pending, config), window
-            )
-            match = steady if steady.accepted else match
+            match = self._hear_wheels(beams, match, predicted, expected)
         poor = match.quality < config.good_share * self._usual_quality
         self._known = window.known_share(beams, predicted) if poor else 1.0
         # after a leap, what ground lies under the hits is chance; else new ground speaks against no pose
@@ -215,6 +212,19 @@ class Tracker(ABC):
         off_x, off_y, _ = (match.T_grid_base - predicted).tolist()
         way_m = math.hypot(self._pending[0], self._pending[1])
         return match.accepted and math.hypot(off_x, off_y) > self.config.doubted_share * way_m > 0.0
+
+    def _hear_wheels(self, beams: Beams, match: Match, predicted: Pose, expected: Uncertainty) -> Match:
+        """Return the match without what stands in front, if it bears the wheels out; else the one given.
+
+        A person who walks along is all that contradicts them then. Wheels that are late or slip are
+        contradicted by everything.
+        """
+        behind = without_foreground(beams)
+        if len(behind.hits) == len(beams.hits):
+            return match
+        steady = self._match(behind, predicted, expected, self._window())
+        off_m, steady_off_m = (math.hypot(*(m.T_grid_base - predicted)[:2]) for m in (match, steady))
+        return steady if steady.accepted and steady_off_m < self.config.doubted_share * off_m else match
 
     def _look_round(
         self, beams: Beams, match: Match, predicted: Pose, wanted: float, *, leapt: bool
