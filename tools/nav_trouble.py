@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.nav.types import Goal, NavState
+from lemtomap.se2 import Pose
 from robot.config import RobotConfig
 from robot.exchange import MissionState
 from robot.missions import Moment, Order
@@ -67,7 +68,7 @@ class Drive:
     begun_m: float = 0.0
     way_m: float = 0.0
     seen_s: float = math.nan
-    """When the robot first was so near to the barrier that it must have seen it."""
+    """When the robot first was so near to the barrier, with nothing before it, that it must have seen it."""
     closed_s: float = math.nan
     """When it first planned around something closed."""
     contacts_before: int = field(default=0)
@@ -80,7 +81,7 @@ class Drive:
             self.contacts_before = truth.contact_count
             return Order(MissionState.RUNNING, "drive", self.goal)
         away_m = float(np.hypot(*(truth.T_world_base[:2] - np.array(self.barrier[:2]))))
-        if math.isnan(self.seen_s) and away_m < IN_SIGHT_M:
+        if math.isnan(self.seen_s) and away_m < IN_SIGHT_M and self._in_sight(truth.T_world_base):
             self.seen_s = moment.now_s
         closed = moment.navigator._way._closed_s  # noqa: SLF001 - measured from outside on purpose
         if math.isnan(self.closed_s) and closed:
@@ -93,6 +94,12 @@ class Drive:
         self.state, self.text = str(moment.output.state), f"{moment.output.reason}: {moment.output.text}"
         self.ended_s, self.way_m = moment.now_s, truth.path_m - self.begun_m
         return Order(MissionState.DONE)
+
+    def _in_sight(self, T_world_base: Pose) -> bool:
+        """Tell whether no wall of the plan, in which the barrier is not, stands before it."""
+        raster = self.rig.simulator.world.raster
+        line = np.linspace(T_world_base[:2], self.barrier[:2], round(IN_SIGHT_M / raster.resolution_m))
+        return not any(raster.occupied[raster.cell(x, y)] for x, y in line.tolist())
 
     def run(self) -> "Drive":
         """Drive to the end."""
