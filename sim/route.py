@@ -15,6 +15,10 @@ from sim.world import Raster
 CELL_M = 0.10  # planning step; finer rasters are thinned
 KEEP_OFF_M = 0.27  # body radius 0.178 m and 9 cm to spare
 LIKE_OFF_M = 0.60  # nearer than this costs more, so that tours keep to the middle
+IN_SIGHT_M = (
+    4.5  # further from everything than a URG-04LX sees well costs more: who maps keeps walls in sight
+)
+OUT_OF_SIGHT_COST = 1.0
 PULLED_M = 20.0  # a grid's way has eight directions; over this length it is pulled straight
 ROOF_REACH_M = 25.0
 FIRST_LIMIT, MOST_COST = 2.0, 2000.0  # the search ends at twice the straight line, then goes on further
@@ -33,6 +37,7 @@ class RoutePlanner:
         self._index[self.passable] = np.arange(int(self.passable.sum()))
         self._cells = np.argwhere(self.passable)
         self._cost = 1.0 + 4.0 * np.maximum(0.0, LIKE_OFF_M - clearance) / LIKE_OFF_M
+        self._cost[clearance > IN_SIGHT_M] += OUT_OF_SIGHT_COST
         self._cost[~self.passable] = np.inf
         self._graph = self._build()
 
