@@ -15,7 +15,14 @@ from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.foreground import without_foreground
 from lemtomap.grid.matching import Match, Matcher, refused
 from lemtomap.grid.matching import kernels as matching_kernels
-from lemtomap.grid.motion import Uncertainty, WheelTrust, between, compose, odometry_uncertainty
+from lemtomap.grid.motion import (
+    Uncertainty,
+    WheelTrust,
+    between,
+    compose,
+    odometry_drift,
+    odometry_uncertainty,
+)
 from lemtomap.grid.publish import SmoothCorrection
 from lemtomap.grid.scan import Beams, ScanPreparer
 from lemtomap.grid.window import Scratch, Window, look_up
@@ -117,6 +124,7 @@ class Tracker(ABC):
         match = self._track(beams, predicted, abs(float(step[2])))
         self._quality, self._diversity, self._covariance = match.quality, match.diversity, match.covariance
         if len(beams.hits) == 0:
+            self._covariance = refused(predicted, odometry_drift(self._pending, self.config)).covariance
             return self._report(predicted, matched=False, integrated=self._see_floor(beams, predicted))
         if not match.accepted:
             if self._known > self.config.new_ground_below:

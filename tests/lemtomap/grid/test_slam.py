@@ -221,8 +221,9 @@ def test_the_window_goes_along_where_the_laser_meets_nothing(kind):
     for index in range(300):
         pose = np.array([0.1 * index, 0.0, 0.0])
         scan = Scan(0.1 * index, np.full(61, np.inf, dtype=np.float32), -1.5, 0.05, silent_free_m=2.5)
-        slam.update(scan, Odometry(0.1 * index, pose))
+        update = slam.update(scan, Odometry(0.1 * index, pose))
     view = slam.view()
+    assert math.sqrt(update.covariance[2, 2]) < 0.3, "a random walk of 30 m, not 0.1 rad for each of them"
     col, row = np.floor((np.array([29.9, 0.0]) - view.origin_m) / view.resolution_m).astype(int)
     assert 0 <= view.occupancy[row, col] < 25
 
