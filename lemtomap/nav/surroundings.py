@@ -68,7 +68,7 @@ class Surroundings:
         """Take over, once, what earlier drives felt, if the graph keeps it."""
         if not self._recalled and isinstance(graph, RemembersMarks):
             for mark in graph.marks():
-                kind = ContactKind(mark.kind)
+                kind = ContactKind.CLIFF if mark.kind == ContactKind.CLIFF else ContactKind.BUMPER
                 shut_s = math.inf if kind is ContactKind.CLIFF else 0.0
                 self._keep(Hazard(mark.node_id, (mark.x_m, mark.y_m), kind, now_s, shut_s))
         self._recalled = True

@@ -80,6 +80,7 @@ def test_of_an_earlier_run_cliffs_shut_their_place_and_bumps_make_it_dear(world)
             return [
                 Mark(1, 1, str(ContactKind.BUMPER), AHEAD_M, 0.0, 0.0),
                 Mark(2, 1, str(ContactKind.CLIFF), -AHEAD_M, 0.0, 0.0),
+                Mark(3, 1, "of another program", 0.0, 2.0, 0.0),
             ]
 
     surroundings = Surroundings(CONFIG)
