@@ -128,6 +128,7 @@ class ExploreConfig:
     least_size_m: float = 0.35  # a 0.8 m door leaves 0.4 m to the middle of a Kobuki
     rest_size_m: float = 0.30  # ... and what is left of it is worth a look while it is larger than this
     least_depth_m: float = 0.20  # dark seams less than twice this deep are gaps between beams
+    spoke_m: float = 0.15  # ... and seen floor narrower than this is such a beam: it shows nothing of a room
     goal_tolerance_m: float = 0.40
     switch_share: float = 0.5  # another opening must cost less than this share of the present one's
     here_price_m: float = 3.0  # an opening beside the robot will mostly be seen in passing

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
 
 from lemtomap import se2
 from lemtomap.nav import kernels
@@ -56,6 +57,16 @@ class Costs:
             row, col = (int(index) for index in self.cell(p_robot_grid))
             cost[row, col] = self.cost[row, col]
         return replace(self, cost=cost)
+
+    def without_spokes(self, thick_m: float) -> "Costs":
+        """Return the same costs with floor unseen where only single beams crossed it.
+
+        thick_m: seen ground keeps what squares of this side fit into.
+        """
+        side = max(1, round(thick_m / self.resolution_m))
+        solid = ndimage.binary_opening(self.state != kernels.UNKNOWN, np.ones((side, side), dtype=np.bool_))
+        spokes = (self.state == kernels.FREE) & ~solid
+        return replace(self, state=np.where(spokes, np.uint8(kernels.UNKNOWN), self.state))
 
     def part(self, inner: tuple[slice, slice], outer: tuple[slice, slice]) -> "Costs":
         """Return the costs of a part of the window; outer is the part of the window this is of."""

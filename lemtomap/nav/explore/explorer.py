@@ -122,7 +122,7 @@ class Explorer:
         """Find the openings of the window, leave out forgotten ones, and join them with the known."""
         config = self.config
         self._costmap.follow_window(map_view.grid)
-        costs = self._costmap.build(map_view.stamp_s, T_grid_base[:2])
+        costs = self._costmap.build(map_view.stamp_s, T_grid_base[:2]).without_spokes(config.spoke_m)
         costs = costs.over_seen_floor(T_grid_base[:2])
         reach = reach_from(costs, T_grid_base)
         self._memory.take(costs, map_view.T_grid_node, T_grid_base, graph)

@@ -17,7 +17,7 @@ RES = 0.05
 SIDE_M = 6.0
 
 
-def ground(unknown=(), walls=(), seen=None) -> Ground:
+def ground(unknown=(), walls=(), seen=None, spoke_m=0.0) -> Ground:
     """Free floor, 6 x 6 m, with unknown and occupied boxes (x0, y0, x1, y1); seen: ground known once."""
     state = np.full((round(SIDE_M / RES),) * 2, kernels.FREE, dtype=np.uint8)
     for boxes, value in ((unknown, kernels.UNKNOWN), (walls, kernels.LETHAL)):
@@ -25,8 +25,8 @@ def ground(unknown=(), walls=(), seen=None) -> Ground:
             state[round(y0 / RES) : round(y1 / RES), round(x0 / RES) : round(x1 / RES)] = value
     clearance = np.full(state.shape, 9.0, dtype=np.float32)
     cost = np.where(state == kernels.FREE, 1.0, np.inf).astype(np.float32)
-    costs = Costs(0.0, RES, (0.0, 0.0), state, clearance, cost)
-    known = (state != kernels.UNKNOWN) if seen is None else seen
+    costs = Costs(0.0, RES, (0.0, 0.0), state, clearance, cost).without_spokes(spoke_m)
+    known = (costs.state != kernels.UNKNOWN) if seen is None else seen
     return Ground.of(reach_from(costs, (1.0, 1.0)), known.astype(np.uint8), 0.2)
 
 
@@ -106,6 +106,14 @@ def test_no_dark_seam_is_one_for_leading_out_of_doors(wide_m, count):
     seam, outside = (3.0, low, 4.5, high), (4.5, 0.0, 6.0, 6.0)
     wall = [(4.2, 0.0, 4.5, low), (4.2, high, 4.5, 6.0)]
     assert len(find_openings(ground([seam, outside], wall), 0.15)) == count
+
+
+def test_a_door_is_not_explored_by_two_beams_that_went_through_it():
+    """A room deeper than the laser reaches shows no more; half of a real building lay behind such a door."""
+    walls = [(3.95, 0.0, 4.05, 2.6), (3.95, 3.4, 4.05, 6.0)]
+    dark = [(4.0, 0.0, 6.0, 2.75), (4.0, 2.85, 6.0, 3.1), (4.0, 3.2, 6.0, 6.0)]
+    (found,) = find_openings(ground(dark, walls, spoke_m=0.15), 0.3)
+    assert found.p_grid == pytest.approx((3.97, 3.0), abs=0.2)
 
 
 def test_an_opening_that_comes_and_goes_is_left_alone_at_last():
