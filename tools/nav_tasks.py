@@ -6,7 +6,7 @@ starting where and as the topological robot did. Costmap, near look, DWA, limits
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -57,11 +57,16 @@ class Legs:
     """A mission that drives goals one after another and writes down each leg."""
 
     def __init__(
-        self, leg: Leg, simulator: Simulator, meters: tuple[Meter, Meter], goals: Sequence[Goal]
+        self,
+        leg: Leg,
+        simulator: Simulator,
+        meters: tuple[Meter, Meter],
+        goals: Sequence[Goal],
+        ends: Sequence[tuple[float, float]],
     ) -> None:
         self.done: list[Leg] = []
-        self.ends: list[tuple[float, float]] = []
-        """Where each goal truly lies, as seen from the robot that arrived there; world metres."""
+        self.ends = list(ends)
+        """Where each goal truly lies, world metres: as seen on arrival, else as given."""
         self._like, self._simulator, self._goals = leg, simulator, list(goals)
         self._first_meter, self._cycle_meter = meters
         self._leg: Leg | None = None
@@ -97,18 +102,19 @@ class Legs:
         leg.first_plan_ms = 1e3 * (self._first_meter.first_s or 0.0)
         leg.planner_cpu_s = self._cycle_meter.total_s
         leg.stops = stops(leg.v_mps)
+        if moment.output.state == NavState.ARRIVED:
+            self._note_end(leg.number, moment)
         self.done.append(leg)
         self._leg = None
-        self._note_end(moment)
         return True
 
-    def _note_end(self, moment: Moment) -> None:
+    def _note_end(self, number: int, moment: Moment) -> None:
         view = moment.view
         node_id = self._goal.node_id if self._goal.node_id in view.T_grid_node else view.associated_id
         T_grid_goal = se2.compose(view.T_grid_node[node_id], [*self._goal.p_node, 0.0])
         T_base_goal = se2.between(view.T_grid_base, T_grid_goal)
         x, y, _ = se2.compose(self._simulator.truth().T_world_base, T_base_goal)
-        self.ends.append((float(x), float(y)))
+        self.ends[number] = float(x), float(y)
 
 
 def stops(v_mps: Sequence[float]) -> int:
@@ -130,19 +136,24 @@ def run_pair(name: str, metres: float, seed: int, folder: Path) -> list[Leg]:
     rig.lead(errand[: 2 * quarter])
     start = rig.simulator.truth().T_world_base.copy()
     far, home = rig.nearest_node(errand[quarter]), rig.nearest_node(errand[0])
-    topological, ends = _topological(rig, Leg("topological", name, seed, 0), [far, home, far, home])
+    goals = {far: errand[quarter], home: errand[0]}
+    topological, ends = _topological(rig, Leg("topological", name, seed, 0), goals)
     rig.close()
     return [*topological, *_metric(world, start, ends, Leg("metric", name, seed, 0))]
 
 
-def _topological(rig: Rig, leg: Leg, nodes: Sequence[int]) -> tuple[list[Leg], list[tuple[float, float]]]:
+def _topological(
+    rig: Rig, leg: Leg, places: Mapping[int, tuple[float, float]]
+) -> tuple[list[Leg], list[tuple[float, float]]]:
+    """Drive from node to node, twice round; places: about where they lie, world metres."""
     meters = Meter(), Meter()
     navigator = rig.core.navigation.navigator
     routes = navigator._way._planner  # noqa: SLF001 - measured from outside on purpose
     routes.plan = meters[0].timed(routes.plan)  # type: ignore[method-assign]
     navigator.step = meters[1].timed(navigator.step)  # type: ignore[method-assign]
-    legs = Legs(leg, rig.simulator, meters, [Goal(node) for node in nodes])
-    rig.run(legs, LEG_LIMIT_S * len(nodes))
+    goals = [Goal(node_id) for node_id in places] * 2
+    legs = Legs(leg, rig.simulator, meters, goals, list(places.values()) * 2)
+    rig.run(legs, LEG_LIMIT_S * len(goals))
     return legs.done, legs.ends
 
 
@@ -164,7 +175,7 @@ def drive_metric(
     look = navigator.lookout.far
     look._search = meters[0].timed(look._search)  # type: ignore[attr-defined]  # noqa: SLF001
     navigator.step = meters[1].timed(navigator.step)  # type: ignore[method-assign]
-    legs = Legs(leg, simulator, meters, [Goal(GRID_ID, end) for end in ends])
+    legs = Legs(leg, simulator, meters, [Goal(GRID_ID, end) for end in ends], ends)
     Rig(simulator, core).run(legs, LEG_LIMIT_S * len(ends))
     return legs
 
@@ -188,7 +199,15 @@ def bench_tasks(name: str, metres: float, seeds: Sequence[int], out: Path) -> li
 
 
 def report(legs: Sequence[Leg]) -> dict[str, list[float]]:
-    """Print the legs and their means; return per kind time s, way m, first plan ms, planner CPU s."""
+    """Print the legs and their means; return per kind time s, way m, first plan ms, planner CPU s.
+
+    Means are over the legs that both kinds of navigation drove to their end.
+    """
+    arrived = [
+        {(leg.world, leg.seed, leg.number) for leg in legs if leg.kind == kind and leg.state == "arrived"}
+        for kind in KINDS
+    ]
+    both = arrived[0] & arrived[1]
     for leg in legs:
         print(
             f"  {leg.kind:11} {leg.seed}.{leg.number} {leg.state} {leg.time_s:.1f} s {leg.path_m:.2f} m "
@@ -199,8 +218,9 @@ def report(legs: Sequence[Leg]) -> dict[str, list[float]]:
     means = {}
     for kind in KINDS:
         mine = [leg for leg in legs if leg.kind == kind]
+        driven = [leg for leg in mine if (leg.world, leg.seed, leg.number) in both]
         means[kind] = values = [
-            float(np.mean([getattr(leg, name) for leg in mine]))
+            float(np.mean([getattr(leg, name) for leg in driven] or [np.nan]))
             for name in ("time_s", "path_m", "first_plan_ms", "planner_cpu_s")
         ]
         reached = sum(leg.state == "arrived" for leg in mine)
