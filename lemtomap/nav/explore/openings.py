@@ -19,6 +19,10 @@ NEWS_M = 0.3
 SHAMS = 3
 """An opening that came and went so often at one place is none: what is remembered of the ground there is not
 seen from every side, and the robot would turn to and fro between it and where it wants to go."""
+SHAM_M = 0.5
+"""So near to where one went it is the same place ..."""
+RECEDED_S, RECEDED_M = 2.0, 0.25
+"""... but one that went so lately and came again so far from there has receded before the robot."""
 GONE_KEPT = 1024
 
 
@@ -28,7 +32,9 @@ class _Kept:
     told: Placeholder | None = None
     failures: int = 0
     gone: int = 0
-    """How often an opening at this place was found explored before."""
+    """How often an opening at this place was found explored before ..."""
+    gone_s: float = 0.0
+    """... and when it was, last."""
     not_before_s: float = 0.0
     reopened: bool = False
 
@@ -93,7 +99,7 @@ class Openings:
                 del free[number]
             elif _same(opening.p_grid, places, ground) is not None:
                 continue  # a second piece of an opening already matched
-            gone = None if number is not None else _same(opening.p_grid, gone_places, ground)
+            gone = None if number is not None else self._went_here(opening, gone_places, ground, now_s)
             if number is None and self._is_nothing(opening, gone):
                 continue
             known_from = here_id
@@ -108,7 +114,17 @@ class Openings:
         for number, place in free.items():
             kept = self._kept[number]
             if kept.placeholder.state == OpeningState.OPEN and not ground.still_open(place):
-                self.done(number, closed=False)
+                self._explored(number, now_s)
+
+    def _went_here(
+        self, opening: Opening, gone_places: Mapping[int, Pose], ground: Ground, now_s: float
+    ) -> int | None:
+        """Return the explored opening that an opening may be, as it comes again at its place."""
+        number = _same(opening.p_grid, gone_places, ground, SHAM_M)
+        if number is None or now_s - self._gone[number].gone_s > RECEDED_S:
+            return number
+        receded_m = float(np.hypot(*(gone_places[number] - opening.p_grid)))
+        return number if receded_m <= RECEDED_M else None
 
     def _is_nothing(self, opening: Opening, gone: int | None) -> bool:
         """Tell whether an opening is enough to go on with but too little to begin with, or a sham."""
@@ -144,7 +160,7 @@ class Openings:
         kept.failures += 1
         kept.not_before_s = now_s + pause_s
         if kept.failures >= attempts:
-            self.done(number, closed=True)
+            self._shut(number)
 
     def spend(self, number: int) -> None:
         """There is nothing more to see from an opening: remember it, so that it is not found again."""
@@ -153,20 +169,20 @@ class Openings:
             self._events.append(OpeningDone(number, closed=False))
             kept.placeholder = replace(kept.placeholder, state=OpeningState.EXPLORED)
 
-    def done(self, number: int, *, closed: bool) -> None:
-        """An opening was explored, or is closed for good."""
-        kept = self._kept.get(number)
-        if kept is None:
-            return
-        self._events.append(OpeningDone(number, closed))
-        if closed:
-            kept.placeholder = replace(kept.placeholder, state=OpeningState.CLOSED)
-        else:
-            del self._kept[number]
-            kept.gone += 1
-            self._gone[number] = kept
-            if len(self._gone) > GONE_KEPT:
-                del self._gone[next(iter(self._gone))]
+    def _shut(self, number: int) -> None:
+        """An opening is closed for good."""
+        self._events.append(OpeningDone(number, closed=True))
+        kept = self._kept[number]
+        kept.placeholder = replace(kept.placeholder, state=OpeningState.CLOSED)
+
+    def _explored(self, number: int, now_s: float) -> None:
+        """The ground behind an opening was seen."""
+        self._events.append(OpeningDone(number, closed=False))
+        kept = self._kept.pop(number)
+        kept.gone, kept.gone_s = kept.gone + 1, now_s
+        self._gone[number] = kept
+        if len(self._gone) > GONE_KEPT:
+            del self._gone[next(iter(self._gone))]
 
 
 def _places(kept: Mapping[int, _Kept], T_grid_node: Mapping[int, Pose]) -> dict[int, Pose]:
@@ -182,8 +198,10 @@ def _point(placeholder: Placeholder) -> tuple[float, float]:
     return placeholder.x_m, placeholder.y_m
 
 
-def _same(p_grid: tuple[float, float], places: Mapping[int, Pose], ground: Ground) -> int | None:
+def _same(
+    p_grid: tuple[float, float], places: Mapping[int, Pose], ground: Ground, within_m: float = SAME_M
+) -> int | None:
     """Return the nearest place that an opening may be; one behind a wall is another one."""
     away = {number: float(np.hypot(*(place - p_grid))) for number, place in places.items()}
-    near = sorted((number for number in away if away[number] <= SAME_M), key=lambda n: away[n])
+    near = sorted((number for number in away if away[number] <= within_m), key=lambda n: away[n])
     return next((number for number in near if not ground.walled_off(places[number], p_grid)), None)

@@ -129,6 +129,17 @@ def test_an_opening_that_comes_and_goes_is_left_alone_at_last():
     assert len(openings.of_state(OpeningState.OPEN)) == 1
 
 
+def test_an_opening_that_recedes_before_the_robot_is_none_that_comes_and_goes():
+    """A door deep in the dark is uncovered bit by bit; after four bits the room behind it was given up."""
+    openings = Openings()
+    for look in range(6):
+        edge = (2.0 + 0.4 * look, 3.0)
+        openings.match([Opening(edge, 0.0, 1.0)], ground([DARK_ROOM]), NODES, 1, 1.0 * look)
+        assert len(openings.of_state(OpeningState.OPEN)) == 1
+        openings.match([], ground(), NODES, 1, 1.0 * look + 0.5)
+        assert len(openings.of_state(OpeningState.OPEN)) == 0
+
+
 def strips(count: int) -> list[tuple[float, float, float, float]]:
     """What the window has forgotten between the beams that still reach the edge of the dark room."""
     return [(2.0, 0.05 + 0.4 * k, 4.0, 0.35 + 0.4 * k) for k in range(count)]
