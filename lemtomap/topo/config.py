@@ -21,6 +21,7 @@ class TopoConfig:
     )
     near_neighbour_sigma_m: float = 0.2  # a node only predicted must be predicted this well: a robot's radius
     seam_sigma_m: float = 0.5  # for an edge that is only driven along, from one round's nodes to another's
+    seam_open_sigma_m: float = 1.5  # ... in the open, where that much doubt leads through no wall
     robot_radius_m: float = 0.18  # Kobuki's body, 351.5 mm across
     occupied_from: int = 50  # occupancy of GridView that stops the robot
     place_radius_m: float = 5.0  # half the window less the distance at which data is taken

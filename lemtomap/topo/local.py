@@ -42,7 +42,12 @@ class Standing:
 
     def is_within(self, sigma_m: float) -> bool:
         """Tell whether its place is known this well in every direction, one standard deviation."""
-        return float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]) <= sigma_m**2
+        return self.sigma_m <= sigma_m
+
+    @property
+    def sigma_m(self) -> float:
+        """How well its place is known in the worst direction, one standard deviation."""
+        return math.sqrt(max(0.0, float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1])))
 
 
 class LocalMap:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,8 +211,8 @@ class TopoMapper:
         self._take_places()
         self.local.settle(node_id)
         self._anchor_beside(node_id)
-        grid = self._require().grid
-        for edge in self._neighbours.edges_for(node_id, self.graph, self.local, grid):
+        here = node_id, self.graph, self.local, self._require().grid
+        for edge in chain(self._neighbours.edges_for(*here), self._neighbours.seams_at(*here)):
             self.graph.add_edge(edge)
         if self._recogniser is not None:
             self._recogniser.at_node(self, born=True)

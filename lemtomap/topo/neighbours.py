@@ -18,6 +18,10 @@ SEAM_SHARE = 2.0
 """Nodes side by side are apart when the way along the edges is so many times as long as an edge may be."""
 
 
+OPEN_SIGMAS = 1.5
+"""Within so many standard deviations of a doubtful place no wall may stand."""
+
+
 class NeighbourFinder:
     """Decides which near-neighbour edges a new node gets."""
 
@@ -55,18 +59,29 @@ class NeighbourFinder:
                 yield self._edge(node_id, other_id, local)
 
     def seams_at(self, node_id: int, graph: PagedGraph, local: LocalMap, grid: GridView) -> Iterator[Edge]:
-        """Give the edge to the nearest node beside a node visited again that is far along the edges, if any.
+        """Give the edge to the nearest node beside a node that is far along the edges, if any.
 
         Two rounds through one corridor leave two chains of nodes side by side when the second was driven
-        before its closure was found, and a bare corridor never tells how far along it the two are apart. The
-        robot can go from one to the other all the same; unless an edge says so, a route may lead along one
-        chain to its end and back along the other. The edge tells the solve nothing: its share is 0.
+        before its closure was found, and a bare corridor never tells how far along it the two are apart; nor
+        does a hall wider than the laser sees. The robot can go from one to the other all the same; unless an
+        edge says so, a route may lead along one chain to its end and back along the other. The edge tells the
+        solve nothing: its share is 0.
         """
-        sigma_m, seam_m = self._config.seam_sigma_m, SEAM_SHARE * self._config.near_neighbour_max_m
+        config, seam_m = self._config, SEAM_SHARE * self._config.near_neighbour_max_m
         far = {other_id for other_id, reached in local.reached.items() if reached.distance_m > seam_m}
-        if far and _is_sure(local.standings[node_id], sigma_m):
-            for edge in islice(self._edges_to(far, node_id, graph, local, grid, sigma_m), 1):
-                yield replace(edge, share=0.0)
+        here = local.standings[node_id]
+        if far and _is_sure(here, config.seam_sigma_m):
+            edges = self._edges_to(far, node_id, graph, local, grid, config.seam_open_sigma_m)
+            seams = (edge for edge in edges if self._is_open(here, local.standings[edge.target_id], grid))
+            for seam in islice(seams, 1):
+                yield replace(seam, share=0.0)
+
+    def _is_open(self, here: Standing, there: Standing, grid: GridView) -> bool:
+        """Tell whether the robot could go from one to the other wherever the other may truly be."""
+        if _is_sure(there, self._config.seam_sigma_m):
+            return True
+        wide = replace(self._config, robot_radius_m=self._config.robot_radius_m + OPEN_SIGMAS * there.sigma_m)
+        return directly_navigable(grid, here.T_grid_node, there.T_grid_node, wide)
 
     def _candidates(
         self, others: Container[int], node_id: int, local: LocalMap, sigma_m: float
