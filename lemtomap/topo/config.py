@@ -36,7 +36,8 @@ class TopoConfig:
     fresh_m: float = 10.0  # way after which a node's place in the window is measured again
     align_again_m: float = 0.3  # a refused match is tried again after this way
     align_widen: float = 2.0  # and its prediction believed that much less (variance), up to
-    align_widest_m: float = 0.3  # this standard deviation
+    align_widest_m: float = 0.3  # this standard deviation of its place
+    align_widest_rad: float = 0.05  # and of its heading: what a gyro drifts by in some minutes
     implicit_sigma_m: float = 0.3  # a near neighbour predicted this well may be matched at once
     commit_every_s: float = 0.5  # design section 7: at most a second is lost
     paged_nodes: int = 1024  # nodes kept in memory with their edges, some 2 kB each

@@ -75,11 +75,17 @@ class LocalMap:
             T_grid_node, covariance, anchored=True, born=born, measured_m=self.way_m, seen=seen
         )
 
-    def doubt(self, node_id: int, widen: float, widest_m: float) -> None:
-        """Believe a prediction less: the window did not bear it out."""
-        standing = self.standings[node_id]
-        if float(np.trace(standing.covariance[:2, :2])) < 2.0 * widest_m**2:
-            self.standings[node_id] = replace(standing, covariance=widen * standing.covariance)
+    def doubt(self, node_id: int) -> None:
+        """Believe a prediction less: the window did not bear it out.
+
+        Place and heading each have their bound: a place known to a centimetre is doubted many times before it
+        comes to its own, and whatever follows along the edges would swing about a heading doubted as often.
+        """
+        config, standing = self._config, self.standings[node_id]
+        place = float(np.trace(standing.covariance[:2, :2])) < 2.0 * config.align_widest_m**2
+        heading = float(standing.covariance[2, 2]) < config.align_widest_rad**2
+        grown = np.where([place, place, heading], math.sqrt(config.align_widen), 1.0)
+        self.standings[node_id] = replace(standing, covariance=standing.covariance * np.outer(grown, grown))
 
     def predicted_near(self, T_grid_base: Pose, within_m: float, sigma_m: float) -> int:
         """Return the nearest node that the graph predicts this well and the window does not hold; 0: none."""

@@ -242,7 +242,7 @@ class TopoMapper:
         else:
             self._transform = self._measured(node_id)
             if not self._transform.measured:
-                self.local.doubt(node_id, self.config.align_widen, self.config.align_widest_m)
+                self.local.doubt(node_id)
         standing = self.local.standings[node_id]
         seen = relative_to_window(self._require().slam)
         self._drift = chain_covariance(standing.covariance, self.T_node_base, seen)

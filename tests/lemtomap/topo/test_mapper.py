@@ -153,3 +153,15 @@ def test_the_nearest_node_that_is_surely_predicted_is_looked_for_in_the_window(t
             local.standings[node_id] = Standing(np.array([x_m, 0.0, 0.0]), covariance, anchored=anchored)
         assert local.predicted_near(np.zeros(3), 3.0, 0.2) == 3
         assert local.predicted_near(np.zeros(3), 1.9, 0.2) == 0
+
+
+def test_a_refused_place_is_doubted_no_further_than_a_match_may_look():
+    """What follows along the edges swung about by 16 degrees after a hall in which no place was matched."""
+    config = TopoConfig()
+    local = LocalMap(None, config)
+    local.standings[1] = Standing(pose(0, 0, 0), np.diag([1e-4, 1e-4, 1e-4]), anchored=False)
+    for _ in range(40):
+        local.doubt(1)
+    sigmas = np.sqrt(np.diag(local.standings[1].covariance))
+    assert np.all(sigmas[:2] > config.align_widest_m)
+    assert np.all(sigmas < 2.0 * np.array([config.align_widest_m] * 2 + [config.align_widest_rad]))
