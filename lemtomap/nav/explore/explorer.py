@@ -127,7 +127,7 @@ class Explorer:
         reach = reach_from(costs, T_grid_base)
         self._memory.take(costs, map_view.T_grid_node, T_grid_base, graph)
         seen = self._memory.recall(costs, graph)
-        ground = Ground.of(reach, seen, config.least_depth_m)
+        ground = Ground.of(reach, seen, config.least_depth_m, self._nav.body.radius_m)
         openings = find_openings(ground, config.rest_size_m)
         self._openings.match(openings, ground, map_view.T_grid_node, map_view.associated_id, now_s)
         return reach

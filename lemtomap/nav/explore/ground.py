@@ -11,8 +11,10 @@ from lemtomap.nav.explore import kernels
 from lemtomap.nav.metric import Reach
 from lemtomap.se2 import Pose
 
-NEAR_CELLS = 4
+NEAR_CELLS = 5
 """Remembered ground is drawn this much too large; new ground begins beyond."""
+NECK_M = 0.8
+"""So deep may the dark be too narrow for a patch before it widens: a corridor between walls seen edge-on."""
 JUDGED_M = 0.5
 """Nearer to the window's border than this nothing is said about an opening."""
 UP_TO_M = 0.3
@@ -28,16 +30,22 @@ class Ground:
     reach: Reach
     large: NDArray[np.uint8]
     """uint8 (rows, cols), 1 on unseen ground of some depth."""
+    leads: NDArray[np.uint8]
+    """uint8 (rows, cols), 1 on hidden ground from which the robot gets to such ground."""
 
     @classmethod
-    def of(cls, reach: Reach, seen: NDArray[np.uint8], least_depth_m: float) -> Self:
+    def of(cls, reach: Reach, seen: NDArray[np.uint8], least_depth_m: float, body_m: float) -> Self:
         """Return the ground as a window shows it.
 
         seen: uint8 (rows, cols), 1 where the ground is known or was known once; unseen ground counts
-        where it fills a square of twice least_depth_m.
+        where it fills a square of twice least_depth_m. body_m: radius of the robot.
         """
-        depth = max(1, round(least_depth_m / reach.costs.resolution_m))
-        return cls(reach, np.asarray(kernels.large_unknown(seen, depth)))
+        costs, res = reach.costs, reach.costs.resolution_m
+        large = np.asarray(kernels.large_unknown(seen, max(1, round(least_depth_m / res))))
+        leads = kernels.leading_on(
+            costs.state, seen, costs.clearance, large, body_m / res, round(NECK_M / res), NEAR_CELLS
+        )
+        return cls(reach, large, np.asarray(leads))
 
     def still_open(self, p_grid: ArrayLike) -> bool:
         """Tell whether an opening that was not found again at its place may still lead to unseen ground.

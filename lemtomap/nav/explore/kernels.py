@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+F4 = NDArray[np.float32]
 I4 = NDArray[np.int32]
 U1 = NDArray[np.uint8]
 
@@ -55,26 +56,57 @@ def _sum_of(total: I4, r0: int, c0: int, r1: int, c1: int) -> int:
 
 
 @njit(nogil=True, cache=True)
-def frontier_cells(reach: U1, state: U1, large: U1, near: int) -> U1:
-    """Return 1 where the robot can stand on known floor with a large unseen patch within `near` cells."""
+def leading_on(
+    state: U1, seen: U1, clearance: F4, large: U1, body: float, unseen_steps: int, known_steps: int
+) -> U1:
+    """Return 1 on the ground, hidden now, from which a body gets to a large unseen patch.
+
+    body: its radius, cells. At most so many steps from cell to cell lead over ground that was never seen, and
+    so many more, at the end that is nearer to the floor, over ground that is only remembered: that is drawn
+    too large, and its walls are forgotten.
+    """
+    height, width = state.shape
+    out = np.zeros((height, width), dtype=np.uint8)
+    queue = np.empty(height * width, dtype=np.int32)
+    count = 0
+    for r in range(height):
+        for c in range(width):
+            if large[r, c] and clearance[r, c] >= body:
+                out[r, c] = 1
+                queue[count] = r * width + c
+                count += 1
+    begin = 0
+    for step in range(unseen_steps + known_steps):
+        if step == unseen_steps:
+            begin = 0
+        end = count
+        for k in range(begin, end):
+            r, c = queue[k] // width, queue[k] % width
+            for dr, dc in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                rr, cc = r + dr, c + dc
+                if rr < 0 or cc < 0 or rr >= height or cc >= width or out[rr, cc]:
+                    continue
+                hidden = state[rr, cc] == UNKNOWN and (step >= unseen_steps or seen[rr, cc] == 0)
+                if hidden and clearance[rr, cc] >= body:
+                    out[rr, cc] = 1
+                    queue[count] = rr * width + cc
+                    count += 1
+        begin = end
+    return out
+
+
+@njit(nogil=True, cache=True)
+def frontier_cells(reach: U1, state: U1, leads: U1) -> U1:
+    """Return 1 where the robot can stand on known floor beside unseen ground that leads on."""
     height, width = reach.shape
     out = np.zeros((height, width), dtype=np.uint8)
     for r in range(1, height - 1):
         for c in range(1, width - 1):
             if reach[r, c] != 1:
                 continue
-            edge = (
-                state[r - 1, c] == UNKNOWN
-                or state[r + 1, c] == UNKNOWN
-                or state[r, c - 1] == UNKNOWN
-                or state[r, c + 1] == UNKNOWN
-            )
-            if not edge:
-                continue
-            for rr in range(max(0, r - near), min(height, r + near + 1)):
-                for cc in range(max(0, c - near), min(width, c + near + 1)):
-                    if large[rr, cc]:
-                        out[r, c] = 1
+            for dr, dc in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                if state[r + dr, c + dc] == UNKNOWN and leads[r + dr, c + dc]:
+                    out[r, c] = 1
     return out
 
 

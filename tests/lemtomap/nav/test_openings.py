@@ -15,19 +15,21 @@ from lemtomap.topo.graph import OpeningState
 
 RES = 0.05
 SIDE_M = 6.0
+BODY_M = 0.18
 
 
-def ground(unknown=(), walls=(), seen=None, spoke_m=0.0) -> Ground:
+def ground(unknown=(), walls=(), seen=None, spoke_m=0.0, start=(1.0, 1.0)) -> Ground:
     """Free floor, 6 x 6 m, with unknown and occupied boxes (x0, y0, x1, y1); seen: ground known once."""
     state = np.full((round(SIDE_M / RES),) * 2, kernels.FREE, dtype=np.uint8)
     for boxes, value in ((unknown, kernels.UNKNOWN), (walls, kernels.LETHAL)):
         for x0, y0, x1, y1 in boxes:
             state[round(y0 / RES) : round(y1 / RES), round(x0 / RES) : round(x1 / RES)] = value
-    clearance = np.full(state.shape, 9.0, dtype=np.float32)
-    cost = np.where(state == kernels.FREE, 1.0, np.inf).astype(np.float32)
+    clearance = kernels.clearance_transform(state, 9.0)
+    open_floor = (state == kernels.FREE) & (clearance > BODY_M / RES)
+    cost = np.where(open_floor, 1.0, np.inf).astype(np.float32)
     costs = Costs(0.0, RES, (0.0, 0.0), state, clearance, cost).without_spokes(spoke_m)
     known = (costs.state != kernels.UNKNOWN) if seen is None else seen
-    return Ground.of(reach_from(costs, (1.0, 1.0)), known.astype(np.uint8), 0.2)
+    return Ground.of(reach_from(costs, start), known.astype(np.uint8), 0.2, BODY_M)
 
 
 DARK_ROOM = (4.0, 0.0, 6.0, 6.0)
@@ -114,6 +116,14 @@ def test_a_door_is_not_explored_by_two_beams_that_went_through_it():
     dark = [(4.0, 0.0, 6.0, 2.75), (4.0, 2.85, 6.0, 3.1), (4.0, 3.2, 6.0, 6.0)]
     (found,) = find_openings(ground(dark, walls, spoke_m=0.15), 0.3)
     assert found.p_grid == pytest.approx((3.97, 3.0), abs=0.2)
+
+
+def test_a_corridor_whose_walls_are_seen_edge_on_leads_on():
+    """Between the floor along both walls its dark is too narrow for a patch until they end."""
+    walls = [(0.0, 2.4, 6.0, 2.5), (0.0, 3.4, 6.0, 3.5)]
+    dark = [(3.0, 2.75, 3.6, 3.15), (3.6, 0.0, 6.0, 6.0), (0.0, 3.5, 6.0, 6.0), (0.0, 0.0, 6.0, 2.4)]
+    (found,) = find_openings(ground(dark, walls, start=(1.0, 3.0)), 0.3)
+    assert found.p_grid == pytest.approx((2.97, 2.95), abs=0.3)
 
 
 def test_an_opening_that_comes_and_goes_is_left_alone_at_last():
