@@ -65,6 +65,11 @@ class SlamConfig:
     trust_least: float = 1.0
     trust_most: float = 4.0
 
+    # ... and about the heading, as a factor on how far it drifts where nothing is matched
+    heading_stretch_m: float = 1.0
+    heading_memory: float = 0.05  # share of the newest stretch
+    heading_least: float = 0.1
+
     # drift of the window's frame: after so much travel or turning it is off by the error of one more match
     renew_m: float = 1.2
     renew_rad: float = 2.0

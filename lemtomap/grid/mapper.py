@@ -16,6 +16,7 @@ from lemtomap.grid.foreground import without_foreground
 from lemtomap.grid.matching import Match, Matcher, refused
 from lemtomap.grid.matching import kernels as matching_kernels
 from lemtomap.grid.motion import (
+    HeadingTrust,
     Uncertainty,
     WheelTrust,
     between,
@@ -62,7 +63,7 @@ class Tracker(ABC):
         self._scratch = Scratch(config.cells)
         self._match = Matcher(config, self._tables)
         self._prepare = ScanPreparer()
-        self._trust = WheelTrust(config)
+        self._trust, self._heading = WheelTrust(config), HeadingTrust(config)
         self._correction = SmoothCorrection(config)
         self._T_grid_base: Pose | None = None
         self._beams: Beams | None = None
@@ -124,7 +125,8 @@ class Tracker(ABC):
         match = self._track(beams, predicted, abs(float(step[2])))
         self._quality, self._diversity, self._covariance = match.quality, match.diversity, match.covariance
         if len(beams.hits) == 0:
-            self._covariance = refused(predicted, odometry_drift(self._pending, self.config)).covariance
+            drift = self._heading.narrow(odometry_drift(self._pending, self.config))
+            self._covariance = refused(predicted, drift).covariance
             return self._report(predicted, matched=False, integrated=self._see_floor(beams, predicted))
         if not match.accepted:
             if self._known > self.config.new_ground_below:
@@ -210,6 +212,8 @@ class Tracker(ABC):
         elif match.accepted and way_m > config.match_distance_m:
             change = match.T_grid_base - predicted
             self._trust.learn(change, float(predicted[2]), match.information, expected)
+            turned, seen = float(wrap_angle(change[2])), float(match.information[2, 2])
+            self._heading.learn(turned, self._pending, seen, expected.sigma_rad)
         if match.accepted or not self._usual_quality:
             share = config.quality_memory if self._usual_quality else 1.0
             self._usual_quality += share * (match.quality - self._usual_quality)

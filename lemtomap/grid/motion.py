@@ -111,3 +111,42 @@ class WheelTrust:
         ratio = min((innovation_m / uncertainty.sigma_m) ** 2, 4.0 * most)
         self._variance_ratio += self._memory * (ratio - self._variance_ratio)
         self._variance_ratio = min(max(self._variance_ratio, least), most)
+
+
+class HeadingTrust:
+    """Learns from the matches by how much less this robot's heading drifts than the settings allow: a gyro's
+    by a tenth of what wheels do.
+
+    One match errs by as much as a gyro does over metres; what the corrections of a stretch add up to tells.
+    """
+
+    def __init__(self, config: SlamConfig) -> None:
+        self._config = config
+        self._variance_ratio = 1.0
+        self._corrected_rad = self._allowed = self._way_m = 0.0
+
+    def narrow(self, drift: Uncertainty) -> Uncertainty:
+        """Return the drift of a stretch as experience has it."""
+        return Uncertainty(drift.sigma_m, math.sqrt(self._variance_ratio) * drift.sigma_rad)
+
+    def learn(self, correction_rad: float, step: Pose, information_rad: float, sigma_rad: float) -> None:
+        """Take what a match changed of the heading that a step predicted.
+
+        information_rad: the scan's alone, 1/rad^2; sigma_rad: how far the match let it differ. A scan that
+        does not see the heading well ends the stretch untold.
+        """
+        share = information_rad / (information_rad + 1.0 / sigma_rad**2)
+        if share < SEES_WELL:
+            self._start()
+            return
+        self._corrected_rad += correction_rad / share
+        self._allowed += odometry_drift(step, self._config).sigma_rad ** 2
+        self._way_m += math.hypot(step[0], step[1])
+        if self._way_m >= self._config.heading_stretch_m:
+            ratio = self._corrected_rad**2 / self._allowed
+            self._variance_ratio += self._config.heading_memory * (ratio - self._variance_ratio)
+            self._variance_ratio = min(max(self._variance_ratio, self._config.heading_least**2), 1.0)
+            self._start()
+
+    def _start(self) -> None:
+        self._corrected_rad = self._allowed = self._way_m = 0.0

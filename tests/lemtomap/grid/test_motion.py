@@ -5,7 +5,7 @@ import pytest
 
 from lemtomap import se2
 from lemtomap.grid import SlamConfig, WindowMatcher
-from lemtomap.grid.motion import Uncertainty, WheelTrust
+from lemtomap.grid.motion import HeadingTrust, Uncertainty, WheelTrust, odometry_drift
 from lemtomap.grid.scan import ScanPreparer
 from lemtomap.types import Odometry
 from tests.lemtomap.grid import naive
@@ -32,6 +32,25 @@ def test_wheels_are_trusted_as_far_as_the_matches_bear_them_out():
 
 def test_a_scan_that_does_not_see_along_the_way_says_nothing_about_the_wheels():
     assert taught(np.full(100, 0.5), SEES_ACROSS, SlamConfig()) == 1.0
+
+
+def narrowed(errors_rad, information=1e6):
+    """Share of the allowed drift that is left after so many steps of 0.05 m, each corrected by an error."""
+    config, step = SlamConfig(), np.array([0.05, 0.0, 0.0])
+    trust, drift = HeadingTrust(config), odometry_drift(step, config)
+    for error_rad in errors_rad:
+        trust.learn(float(error_rad), step, information, 0.025)
+    return trust.narrow(drift).sigma_rad / drift.sigma_rad
+
+
+def test_a_heading_is_trusted_as_far_as_the_matches_bear_it_out():
+    """Of a gyro the matches' own scatter of a milliradian is left, which does not add up."""
+    rng = np.random.default_rng(1)
+    allowed_rad = odometry_drift(np.array([0.05, 0.0, 0.0]), SlamConfig()).sigma_rad
+    gyro = 1e-4 * rng.standard_normal(2000) + np.diff(1e-3 * rng.standard_normal(2001))
+    assert narrowed(gyro) < 0.15
+    assert 0.6 < narrowed(allowed_rad * rng.standard_normal(2000)) <= 1.0
+    assert narrowed(gyro, information=100.0) == 1.0
 
 
 def test_stamps_that_do_not_fit_the_scans_cost_little_where_the_scan_sees():
