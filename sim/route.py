@@ -25,9 +25,12 @@ FIRST_LIMIT, MOST_COST = 2.0, 2000.0  # the search ends at twice the straight li
 
 
 class RoutePlanner:
-    """Shortest comfortable ways between points of one world."""
+    """Shortest comfortable ways between points of one world.
 
-    def __init__(self, raster: Raster) -> None:
+    in_sight: keep walls within the reach of a short laser, at the price of a longer way.
+    """
+
+    def __init__(self, raster: Raster, *, in_sight: bool = True) -> None:
         self._stride = max(1, round(CELL_M / raster.resolution_m))
         clearance = clearance_m(raster)[:: self._stride, :: self._stride]
         self.passable: NDArray[np.bool_] = clearance >= KEEP_OFF_M
@@ -37,7 +40,8 @@ class RoutePlanner:
         self._index[self.passable] = np.arange(int(self.passable.sum()))
         self._cells = np.argwhere(self.passable)
         self._cost = 1.0 + 4.0 * np.maximum(0.0, LIKE_OFF_M - clearance) / LIKE_OFF_M
-        self._cost[clearance > IN_SIGHT_M] += OUT_OF_SIGHT_COST
+        if in_sight:
+            self._cost[clearance > IN_SIGHT_M] += OUT_OF_SIGHT_COST
         self._cost[~self.passable] = np.inf
         self._graph = self._build()
 

@@ -17,6 +17,7 @@ from sim.world import World
 
 SMALL_S, LARGE_S = 180.0, 660.0  # about 3 and 11 minutes (T5-2-1)
 COMMAND_S = 0.02
+ABOUT = 0.05  # share of an errand's length
 SPACING_M = 3.0  # between places a tour visits: every room, both ends of corridors
 
 
@@ -104,11 +105,18 @@ def plan_tour(world: World, duration_s: float, config: TourConfig | None = None,
 def plan_errand(world: World, distance_m: float, config: TourConfig | None = None) -> Tour:
     """Return a drive to a place about distance_m away and back the same way, twice (the thesis' navigation
     tasks).
+
+    Of the places that far away, give or take ABOUT, that to which keeping walls in sight costs least:
+    a robot that drives as it was led cannot make good what its leader went round.
     """
-    planner = RoutePlanner(world.raster)
+    planner, direct = RoutePlanner(world.raster), RoutePlanner(world.raster, in_sight=False)
     home = (world.spawn[0], world.spawn[1])
     lengths = {place: _length(planner.path(home, place)) for place in planner.places(home, SPACING_M * 2)}
-    goal = min(lengths, key=lambda place: abs(lengths[place] - distance_m))
+    off_m = {place: abs(length_m - distance_m) for place, length_m in lengths.items()}
+    near = [place for place in lengths if off_m[place] <= ABOUT * distance_m]
+    detours = {place: lengths[place] / _length(direct.path(home, place)) for place in near}
+    nearest = min(off_m, key=off_m.__getitem__)
+    goal = min(detours, key=lambda place: (round(detours[place], 2), off_m[place]), default=nearest)
     way = planner.path(home, goal)
     return Tour(np.concatenate([way, way[::-1]] * 2), config)
 
