@@ -35,6 +35,9 @@ Row = tuple[str, bool, float]
 """What was tried, whether it went right, seconds."""
 Point = NDArray[np.float64]
 """x, y, ... metres, world."""
+THING_HALF_M = 0.30
+ROUND_M = 1.0
+"""Past a thing there is room when the way grows by no more than this."""
 LEAST_WAY_M, MOST_WAY_M = 12.0, 40.0
 
 
@@ -292,16 +295,17 @@ def _beside(
 ) -> Pose2 | None:
     """Return a place near the middle of the way where a thing leaves room to pass; None if there is none."""
     path = planner.path((here[0], here[1]), (there[0], there[1]))
-    if not 6.0 < float(np.hypot(*np.diff(path, axis=0).T).sum()) < MOST_WAY_M:
+    way_m = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    if not 6.0 < way_m < MOST_WAY_M:
         return None
     raster = rig.simulator.world.raster
     for share in rng.uniform(0.3, 0.7, 10):
         x, y, yaw = across(path, float(share))
         aside = float(rng.uniform(-0.25, 0.25))
-        x, y = x - aside * math.sin(yaw), y + aside * math.cos(yaw)
-        sides = [_room(raster, x, y, yaw + sign * math.pi / 2) for sign in (-1, 1)]
-        if max(sides) > 0.30 + 0.60:
-            return x, y, yaw
+        pose = x - aside * math.sin(yaw), y + aside * math.cos(yaw), yaw
+        past = RoutePlanner(barred(raster, pose, THING_HALF_M))
+        if length_m(past, here, there) < way_m + ROUND_M:
+            return pose
     return None
 
 
