@@ -221,9 +221,8 @@ class Tracker(ABC):
 
     def _contradicts_wheels(self, match: Match, predicted: Pose) -> bool:
         """Tell whether a match takes back, or doubles, a good part of the way the wheels have gone."""
-        off_x, off_y, _ = (match.T_grid_base - predicted).tolist()
         way_m = math.hypot(self._pending[0], self._pending[1])
-        return match.accepted and math.hypot(off_x, off_y) > self.config.doubted_share * way_m > 0.0
+        return match.accepted and _off_m(match, predicted) > self.config.doubted_share * way_m > 0.0
 
     def _hear_wheels(self, beams: Beams, match: Match, predicted: Pose, expected: Uncertainty) -> Match:
         """Return the match without what stands in front, if it bears the wheels out; else the one given.
@@ -235,8 +234,8 @@ class Tracker(ABC):
         if len(behind.hits) == len(beams.hits):
             return match
         steady = self._match(behind, predicted, expected, self._window())
-        off_m, steady_off_m = (math.hypot(*(m.T_grid_base - predicted)[:2]) for m in (match, steady))
-        return steady if steady.accepted and steady_off_m < self.config.doubted_share * off_m else match
+        bears_out = _off_m(steady, predicted) < self.config.doubted_share * _off_m(match, predicted)
+        return steady if steady.accepted and bears_out else match
 
     def _look_round(
         self, beams: Beams, match: Match, predicted: Pose, wanted: float, *, leapt: bool
@@ -286,6 +285,12 @@ class Tracker(ABC):
             integrated=integrated,
             jumped=jumped,
         )
+
+
+def _off_m(match: Match, predicted: Pose) -> float:
+    """Return how far from its prediction a match lies."""
+    off_x, off_y, _ = (match.T_grid_base - predicted).tolist()
+    return math.hypot(off_x, off_y)
 
 
 class WindowMatcher(Tracker):
