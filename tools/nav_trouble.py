@@ -7,7 +7,7 @@ reason. Obstacles: chairs with star feet and low bars stand beside the middle of
 
 import math
 import tempfile
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +23,14 @@ from sim import furniture, worlds
 from sim.errors import BadWorld
 from sim.movers import NOWHERE
 from sim.route import RoutePlanner
+from sim.simulator import Truth
 from sim.world import Box, Pose2, Raster, Surface
 from tools.nav_lead import Rig, rig_of, round_trip
 
 DOOR_HALF_M = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3)
 """Half the width of the doors there are. One that stuck out behind the walls would be a new thing there."""
 BAR = Box((0.0, 0.0, 0.09), (0.03, 0.30, 0.03), surface=Surface.DARK)
+BUMP_APART_S = 3.0
 IN_SIGHT_M = 3.0
 LIMIT_S = 400.0
 Row = tuple[str, bool, float]
@@ -74,15 +76,19 @@ class Drive:
     """When the robot first was so near to the barrier, with nothing before it, that it must have seen it."""
     closed_s: float = math.nan
     """When it first planned around something closed."""
-    contacts_before: int = field(default=0)
+    bumps: int = 0
+    """Contacts that are BUMP_APART_S apart: a robot rubs along what it backs off from."""
+    _touched_s: float = -math.inf
+    _counted: int = 0
 
     def step(self, moment: Moment) -> Order:
         """Give the goal, watch, and end with the navigator's verdict."""
         truth = self.rig.simulator.truth()
         if math.isnan(self.begun_s):
             self.begun_s, self.begun_m, self._cycle = moment.now_s, truth.path_m, moment.output.cycle
-            self.contacts_before = truth.contact_count
+            self._counted = truth.contact_count
             return Order(MissionState.RUNNING, "drive", self.goal)
+        self._count_bumps(truth, moment.now_s)
         away_m = float(np.hypot(*(truth.T_world_base[:2] - np.array(self.barrier[:2]))))
         if math.isnan(self.seen_s) and away_m < IN_SIGHT_M and self._in_sight(truth.T_world_base):
             self.seen_s = moment.now_s
@@ -98,6 +104,13 @@ class Drive:
         self.ended_s, self.way_m = moment.now_s, truth.path_m - self.begun_m
         return Order(MissionState.DONE)
 
+    def _count_bumps(self, truth: Truth, now_s: float) -> None:
+        if truth.contact_count > self._counted and now_s - self._touched_s > BUMP_APART_S:
+            self.bumps += 1
+        if truth.contact_count > self._counted or truth.touching:
+            self._touched_s = now_s
+        self._counted = truth.contact_count
+
     def _in_sight(self, T_world_base: Pose) -> bool:
         """Tell whether no wall of the plan, in which the barrier is not, stands before it."""
         raster = self.rig.simulator.world.raster
@@ -109,16 +122,11 @@ class Drive:
         self.rig.run(self, LIMIT_S)
         return self
 
-    @property
-    def contacts(self) -> int:
-        """How often something was touched under way."""
-        return self.rig.simulator.truth().contact_count - self.contacts_before
-
     def told(self) -> str:
         """Return a line about it."""
         return (
             f"{self.state or 'hung'} {self.ended_s - self.begun_s:.1f} s {self.way_m:.1f} m "
-            f"{self.contacts} contacts {self.text}"
+            f"{self.bumps} bumps {self.text}"
         )
 
 
@@ -250,7 +258,7 @@ class _Pause:
 
 
 def bench_obstacles(name: str, seed: int, count: int, *, depth: bool) -> None:
-    """Put unseen things beside the middle of the way and drive there and back; print contacts for each."""
+    """Put unseen things beside the middle of the way and drive there and back; print bumps for each."""
     warm_up(RobotConfig())
     world = worlds.load(name)
     chair = Placed(tuple(furniture.office_chair(0.0, 0.0, 0.3)))
@@ -272,9 +280,9 @@ def bench_obstacles(name: str, seed: int, count: int, *, depth: bool) -> None:
             thing = things[drives // 2 % len(things)]
             thing.pose = pose
             legs = [Drive(rig, Goal(goal)).run() for goal in (node_id, rig.nearest_node(here))]
-            touched = sum(leg.contacts for leg in legs[1:]) + legs[0].contacts - legs[1].contacts
+            touched = sum(leg.bumps for leg in legs)
             kind = "chair" if thing is chair else "bar"
-            print(f"{kind} at {pose[0]:.1f}, {pose[1]:.1f}: {touched} contacts; there: {legs[0].told()}")
+            print(f"{kind} at {pose[0]:.1f}, {pose[1]:.1f}: {touched} bumps; there: {legs[0].told()}")
             print(f"   back: {legs[1].told()}", flush=True)
             drives, total, worst = drives + 2, total + touched, max(worst, touched)
             failed += sum(leg.state != "arrived" for leg in legs)
@@ -286,7 +294,7 @@ def bench_obstacles(name: str, seed: int, count: int, *, depth: bool) -> None:
     eyes = "with" if depth else "without"
     print(
         f"{eyes} the depth camera: {drives} drives past {drives // 2} unseen things, {failed} not reached, "
-        f"{total} contacts, {worst} at most with one thing"
+        f"{total} bumps, {worst} at most with one thing"
     )
 
 
