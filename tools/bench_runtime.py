@@ -1,14 +1,15 @@
 """The robot in real time against the clock: reactions, unplugged cables, processor shares, sudden death.
 
-    python tools/bench_runtime.py bumps [1000]     bumper bit in a packet -> stop command's bytes on the wire
-    python tools/bench_runtime.py plugs [40]       plugs pulled so often while driving: stop, data back, leaks
-    python tools/bench_runtime.py cpu [60]         shares of one core over so many seconds of a mission
-    python tools/bench_runtime.py kill             kill -9 while driving; then the next start
-    python tools/bench_runtime.py noise [180]      a mission with lost bytes, flipped bits, bursts (lock-step)
+    lemtomap bench runtime bumps [1000]     bumper bit in a packet -> stop command's bytes on the wire
+    lemtomap bench runtime plugs [40]       plugs pulled so often while driving: stop, data back, leaks
+    lemtomap bench runtime cpu [60]         shares of one core over so many seconds of a mission
+    lemtomap bench runtime kill             kill -9 while driving; then the next start
+    lemtomap bench runtime noise [180]      a mission with lost bytes, flipped bits, bursts (lock-step)
 
 Everything but `noise` runs on pseudo-terminals with the fake hardware in a process of its own, and maps.
 """
 
+import argparse
 import json
 import os
 import resource
@@ -183,18 +184,25 @@ def measure_noise(seconds: float) -> None:
 
 def main() -> None:
     """Measure what was asked for."""
-    what = sys.argv[1] if len(sys.argv) > 1 else "bumps"
-    number = float(sys.argv[2]) if len(sys.argv) > 2 else None
-    if what in {"bumps", "plugs"}:
-        measure_events(what, int(number or {"bumps": 1000, "plugs": 40}[what]))
-    elif what == "cpu":
+    parser = argparse.ArgumentParser(
+        prog="lemtomap bench runtime",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "what", nargs="?", default="bumps", choices=("bumps", "plugs", "cpu", "kill", "noise")
+    )
+    parser.add_argument("number", nargs="?", type=float, help="how many, or for how many seconds")
+    args = parser.parse_args()
+    number: float | None = args.number
+    if args.what in {"bumps", "plugs"}:
+        measure_events(args.what, int(number or {"bumps": 1000, "plugs": 40}[args.what]))
+    elif args.what == "cpu":
         measure_cpu(number or 60.0)
-    elif what == "kill":
+    elif args.what == "kill":
         measure_kill()
-    elif what == "noise":
-        measure_noise(number or 180.0)
     else:
-        raise SystemExit(f"'{what}': must be bumps, plugs, cpu, kill or noise")
+        measure_noise(number or 180.0)
 
 
 if __name__ == "__main__":
