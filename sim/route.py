@@ -158,6 +158,11 @@ class RoutePlanner:
         return chosen
 
 
+def path_length_m(path: NDArray[np.float64]) -> float:
+    """Return the length of a path, float64 (N, 2) metres."""
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
 def _between(a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return cells from a to b on the straight line, about one apart, float64 (N, 2)."""
     return np.linspace(a, b, max(2, round(float(np.hypot(*(b - a)))) + 1))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.route import RoutePlanner
+from sim.route import RoutePlanner, path_length_m
 from sim.simulator import Simulator
 from sim.world import World
 
@@ -49,7 +49,7 @@ class Tour:
     @property
     def length_m(self) -> float:
         """Length of the whole path."""
-        return float(np.hypot(*np.diff(self.path, axis=0).T).sum())
+        return path_length_m(self.path)
 
     def command(self, pose: NDArray[np.float64]) -> tuple[float, float]:
         """Return (v m/s, w rad/s) that leads from a true pose along the path (pure pursuit)."""
@@ -95,7 +95,7 @@ def plan_tour(world: World, duration_s: float, config: TourConfig | None = None,
         if math.dist(goal, here) > 0.5:
             leg = planner.path(here, goal)
             legs.append(leg)
-            length_m += float(np.hypot(*np.diff(leg, axis=0).T).sum())
+            length_m += path_length_m(leg)
             here = goal
         if not left:
             left = [places[index] for index in rng.permutation(len(places))[: max(2, len(places) // 2)]]
@@ -111,18 +111,16 @@ def plan_errand(world: World, distance_m: float, config: TourConfig | None = Non
     """
     planner, direct = RoutePlanner(world.raster), RoutePlanner(world.raster, in_sight=False)
     home = (world.spawn[0], world.spawn[1])
-    lengths = {place: _length(planner.path(home, place)) for place in planner.places(home, SPACING_M * 2)}
+    lengths = {
+        place: path_length_m(planner.path(home, place)) for place in planner.places(home, SPACING_M * 2)
+    }
     off_m = {place: abs(length_m - distance_m) for place, length_m in lengths.items()}
     near = [place for place in lengths if off_m[place] <= ABOUT * distance_m]
-    detours = {place: lengths[place] / _length(direct.path(home, place)) for place in near}
+    detours = {place: lengths[place] / path_length_m(direct.path(home, place)) for place in near}
     nearest = min(off_m, key=off_m.__getitem__)
     goal = min(detours, key=lambda place: (round(detours[place], 2), off_m[place]), default=nearest)
     way = planner.path(home, goal)
     return Tour(np.concatenate([way, way[::-1]] * 2), config)
-
-
-def _length(path: NDArray[np.float64]) -> float:
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
 def base_command(v_mps: float, w_radps: float) -> bytes:

@@ -31,7 +31,7 @@ from robot.bridge import URG_SILENT_FREE_M
 from robot.logs import open_log
 from sim import worlds
 from sim.carmen import record_tour
-from sim.route import RoutePlanner
+from sim.route import RoutePlanner, path_length_m
 from sim.simulator import Simulator
 from sim.tours import Tour, plan_errand
 from sim.world import Raster, World
@@ -131,7 +131,7 @@ def _detour(mapper: TopoMapper, born: dict[int, Pose], world: World) -> float:
     over_edges = nx.single_source_dijkstra_path_length(graph, 1)
     goal = max(over_edges, key=lambda node_id: over_edges[node_id])
     ends = [(float(born[node_id][0]), float(born[node_id][1])) for node_id in (1, goal)]
-    true_m = np.hypot(*np.diff(RoutePlanner(world.raster).path(*ends), axis=0).T).sum()
+    true_m = path_length_m(RoutePlanner(world.raster).path(*ends))
     return float(over_edges[goal] / true_m)
 
 

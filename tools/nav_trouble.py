@@ -22,7 +22,7 @@ from robot.warmup import warm_up
 from sim import furniture, worlds
 from sim.errors import BadWorld
 from sim.movers import NOWHERE
-from sim.route import RoutePlanner
+from sim.route import RoutePlanner, path_length_m
 from sim.simulator import Truth
 from sim.world import Box, Pose2, Raster, Surface
 from tools.nav_lead import Rig, rig_of, round_trip
@@ -182,7 +182,7 @@ def length_m(planner: RoutePlanner, a: Point, b: Point) -> float:
         path = planner.path((a[0], a[1]), (b[0], b[1]))
     except BadWorld:
         return math.inf
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+    return path_length_m(path)
 
 
 def bench_doors(name: str, seed: int, count: int) -> None:
@@ -212,7 +212,7 @@ def _one_door(rig: Rig, doors: Doors, planner: RoutePlanner, node_id: int) -> li
     here = rig.simulator.truth().T_world_base
     there = rig.T_world_node[node_id]
     path = planner.path((here[0], here[1]), (there[0], there[1]))
-    short_m = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    short_m = path_length_m(path)
     if not LEAST_WAY_M < short_m < MOST_WAY_M:
         return []
     raster = rig.simulator.world.raster
@@ -303,7 +303,7 @@ def _beside(
 ) -> Pose2 | None:
     """Return a place near the middle of the way where a thing leaves room to pass; None if there is none."""
     path = planner.path((here[0], here[1]), (there[0], there[1]))
-    way_m = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    way_m = path_length_m(path)
     if not 6.0 < way_m < MOST_WAY_M:
         return None
     raster = rig.simulator.world.raster

@@ -21,7 +21,7 @@ from lemtomap.errors import BadInput
 from lemtomap.se2 import Pose, between, compose, wrap_angle
 from sim import worlds
 from sim.errors import BadWorld
-from sim.route import RoutePlanner
+from sim.route import RoutePlanner, path_length_m
 from sim.world import Raster, World
 
 BEAMS = 180
@@ -71,7 +71,7 @@ def tour(world: World, length_m: float, rng: np.random.Generator) -> NDArray[np.
         if len(leg) < 2:
             continue
         way.append(leg)
-        gone_m += float(np.hypot(*np.diff(leg, axis=0).T).sum())
+        gone_m += path_length_m(leg)
         at = goal
     way.append(planner.path(at, start))
     return np.concatenate(way)
