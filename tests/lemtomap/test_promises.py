@@ -1,4 +1,4 @@
-"""What the whole promises, each in a world made up for it: the parts may all be right and the sum still wrong."""
+"""What the whole promises, in worlds made up for it: the parts may all be right and the sum still wrong."""
 
 from itertools import pairwise
 

@@ -1,35 +1,13 @@
-"""Break the safety chain on purpose, one hand-made mutant at a time: every one must make a test fail.
-
-    python tools/mutate_safety.py            all mutants
-    python tools/mutate_safety.py cliff      only those whose name contains the word
+"""The safety chain broken on purpose, one hand-made change at a time: every one must make a test fail.
 
 A mutant is one change of one line: a comparison flipped, a rule dropped, a limit moved, a reaction weakened.
 """
 
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
-from dataclasses import dataclass
-from pathlib import Path
-
-ROOT = Path(__file__).resolve().parent.parent
-TESTS = ("tests/robot/test_safety.py", "tests/robot/test_velocity.py")
-
-
-@dataclass(frozen=True, slots=True)
-class Mutant:
-    """One change of one place."""
-
-    name: str
-    old: str
-    new: str
-    path: str = "robot/safety.py"
+from tools.checks.mutants import Mutant
 
 
 def _m(name: str, old: str, new: str, path: str = "robot/safety.py") -> Mutant:
-    return Mutant(name, old, new, path)
+    return Mutant(name, path, old, new)
 
 
 VELOCITY, PROXIMITY = "robot/velocity.py", "robot/proximity.py"
@@ -299,47 +277,3 @@ MUTANTS = (
         VELOCITY,
     ),
 )
-
-
-def survives(mutant: Mutant, folder: Path) -> bool:
-    """Tell whether the tests still pass with the mutant in place."""
-    target = folder / mutant.path
-    text = target.read_text(encoding="utf-8")
-    if text.count(mutant.old) != 1:
-        raise SystemExit(
-            f"mutant '{mutant.name}': its text occurs {text.count(mutant.old)} times in {mutant.path}"
-        )
-    target.write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
-    try:
-        command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *TESTS]
-        environment = dict(os.environ, PYTHONPATH=str(folder), PYTHONDONTWRITEBYTECODE="1")
-        run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False)  # noqa: S603 -- our own tests
-    finally:
-        target.write_text(text, encoding="utf-8")
-    if run.returncode not in (0, 1):
-        raise SystemExit(f"mutant '{mutant.name}': pytest failed to run\n{run.stdout.decode()}")
-    return run.returncode == 0
-
-
-def main() -> None:
-    """Try the mutants and print which survive."""
-    word = sys.argv[1] if len(sys.argv) > 1 else ""
-    chosen = [mutant for mutant in MUTANTS if word in mutant.name]
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for part in ("robot", "lemtomap", "tests/robot"):
-            shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
-        shutil.copy(ROOT / "pyproject.toml", folder)
-        if not survives(Mutant("none", "class SafetyGate:", "class SafetyGate:"), folder):
-            raise SystemExit("the tests fail without any mutant")
-        survivors = []
-        for mutant in chosen:
-            lives = survives(mutant, folder)
-            print(f"{'SURVIVED' if lives else 'killed':9} {mutant.name}", flush=True)
-            survivors += [mutant.name] if lives else []
-    print(f"{len(chosen) - len(survivors)} of {len(chosen)} mutants killed")
-    raise SystemExit(1 if survivors else 0)
-
-
-if __name__ == "__main__":
-    main()
