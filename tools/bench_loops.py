@@ -143,17 +143,17 @@ def checked_closures(
     first: dict[int, int] = {}
     for scan, node_id in enumerate(records["node_id"].tolist()):
         first.setdefault(node_id, scan)
-    closures = [closure for _, closure in driven.recogniser.closures]
-    asked = np.array([first[n] for c in closures for n in (c.here_id, c.node_id)], dtype=np.int64)
+    closures = driven.recogniser.closures
+    asked = np.array([first[n] for c in closures for n in (c.source_id, c.target_id)], dtype=np.int64)
     truth = reference(
         relations[found], scans[found], records["T_grid_base"], driven.smoothed.T_map_base, asked
     )
     for closure in closures:
-        a, b = first[closure.here_id], first[closure.node_id]
-        off = truth.off(a, b, closure.T_here_node)
+        a, b = first[closure.source_id], first[closure.target_id]
+        off = truth.off(a, b, closure.T_source_target)
         off_m = float(np.hypot(off[0], off[1]))
         is_wrong = off_m > WRONG_M or abs(float(off[2])) > WRONG_RAD
-        yield closure.here_id, closure.node_id, off_m, is_wrong, truth.vouches(a, b)
+        yield closure.source_id, closure.target_id, off_m, is_wrong, truth.vouches(a, b)
 
 
 def results(runs: list[Run], out: Path) -> dict[Run, dict[str, Any]]:

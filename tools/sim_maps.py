@@ -149,9 +149,9 @@ class JudgedMap:
 
     def close(self) -> Score:
         """Write the map and the truth beside it; return the score."""
-        for _, closure in self.recogniser.closures:
-            true = between(self.born[closure.here_id], self.born[closure.node_id])
-            off = between(true, closure.T_here_node)
+        for closure in self.recogniser.closures:
+            true = between(self.born[closure.source_id], self.born[closure.target_id])
+            off = between(true, closure.T_source_target)
             off_m = float(np.hypot(off[0], off[1]))
             self.score.worst_m = max(self.score.worst_m, off_m)
             self.score.wrong += off_m > WRONG_M or abs(float(off[2])) > WRONG_RAD

@@ -167,6 +167,12 @@ def chain_covariance(first: Covariance, T_b_c: Pose, second: Covariance) -> Cova
     return np.asarray(carry @ first @ carry.T + second)
 
 
+def reversed_covariance(T_a_b: Pose, covariance: Covariance) -> Covariance:
+    """Return the covariance of T_b_a (axes of a) from that of T_a_b (axes of b), float64 (3, 3)."""
+    turn = adjoint(T_a_b)
+    return np.asarray(turn @ covariance @ turn.T)
+
+
 WEAK_AXIS = 0.1  # a direction with less of the strongest one's information tells nothing (thesis, appendix D)
 
 

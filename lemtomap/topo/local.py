@@ -35,6 +35,8 @@ class Standing:
     """Measured in this window, rather than predicted by the graph."""
     born: bool = False
     """Made in this window: no match stands behind its pose."""
+    found: bool = False
+    """Found in this window by a search that did not rely on where the graph has it."""
     measured_m: float = 0.0
     """Way of the robot when it was measured: the longer ago, the more the window drifted since."""
     seen: Covariance | None = None
@@ -43,6 +45,11 @@ class Standing:
     def is_within(self, sigma_m: float) -> bool:
         """Tell whether its place is known this well in every direction, one standard deviation."""
         return self.sigma_m <= sigma_m
+
+    @property
+    def sure(self) -> bool:
+        """Whether its place in the window owes nothing to the graph."""
+        return self.anchored and (self.born or self.found)
 
     @property
     def sigma_m(self) -> float:
@@ -74,6 +81,17 @@ class LocalMap:
         self.standings[node_id] = Standing(
             T_grid_node, covariance, anchored=True, born=born, measured_m=self.way_m, seen=seen
         )
+
+    def anchor_found(self, node_id: int, T_grid_node: Pose, covariance: Covariance) -> None:
+        """Set a node where it was found in this window, unless it was made there."""
+        known = self.standings.get(node_id)
+        if known is None or not (known.born and known.anchored):
+            self.anchor(node_id, T_grid_node, covariance, seen=covariance)
+            self.standings[node_id] = replace(self.standings[node_id], found=True)
+
+    def sure(self) -> frozenset[int]:
+        """Return the nodes whose place in the window owes nothing to the graph."""
+        return frozenset(node_id for node_id, standing in self.standings.items() if standing.sure)
 
     def doubt(self, node_id: int) -> None:
         """Believe a prediction less: the window did not bear it out.

@@ -7,25 +7,53 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, compose
+from lemtomap.errors import LemtomapError
+from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.doubt import COVARIANCE_FLOOR, NOWHERE, relative_to_window
 from lemtomap.topo.events import NavEvent, NothingKnownHere
-from lemtomap.topo.graph import USUAL_SPEED_MPS, Covariance, Edge, chain_covariance
+from lemtomap.topo.graph import USUAL_SPEED_MPS, Covariance, Edge, chain_covariance, reversed_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
 from lemtomap.topo.levels import Lift, put_on_level
 from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.neighbours import NeighbourFinder, directly_navigable, in_sight
 from lemtomap.topo.paging import PagedGraph
-from lemtomap.topo.protocols import NotStarted, Recogniser, Transform
+from lemtomap.topo.recognition import (
+    Closed,
+    Confirmed,
+    Found,
+    Located,
+    News,
+    NotFound,
+    Recogniser,
+    Revoked,
+    Situation,
+)
 from lemtomap.topo.snapshots import Snapshots
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
 from lemtomap.topo.undoing import take_back
 from lemtomap.topo.whereabouts import pose_quality
 from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
+
+
+class NotStarted(LemtomapError):
+    """A snapshot was asked for before the first scan."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """How the local grid map transform of the associated node is known (thesis, section 3-3-2)."""
+
+    measured: bool
+    """False: the graph's prediction stands in."""
+    covariance: Covariance
+    """float64 (3, 3), axes of the node."""
+    score: float = 1.0
+    reason: str = ""
+    """Why it is not measured."""
 
 
 @dataclass(slots=True)
@@ -73,6 +101,10 @@ class TopoMapper:
         self.part_id = 1
         """First node of the part of the graph made since the robot was lost or switched on."""
         self._recogniser = recogniser
+        if recogniser is not None:
+            recogniser.attach(self.graph)
+        self._news = News.NONE
+        self._sure_m = 0.0
         self._neighbours = NeighbourFinder(config)
         self._associated_id = 0
         self._drift: Covariance = np.zeros((3, 3))
@@ -112,7 +144,7 @@ class TopoMapper:
         `points_base` are the scan's hits, float (N, 2), metres, base frame. Without them the window's cells
         must do for localisation data.
         """
-        before, self._now = self._now, _Now(slam, grid)
+        before, self._now, self._news = self._now, _Now(slam, grid), News.NONE
         self.keeper.observe(slam.T_grid_base, points_base)
         if before is None:
             self._begin()
@@ -122,8 +154,7 @@ class TopoMapper:
             if grid is not before.grid:
                 self.local.release_forgotten(grid)
             self._associate_or_create()
-        if self._recogniser is not None:
-            self._recogniser.update(self)
+        self._recognise()
         standing = self.local.standings[self._associated_id]
         seen = standing.seen if standing.anchored else None
         self.trail.append(slam, self._associated_id, self.T_node_base, seen, points_base)
@@ -140,7 +171,7 @@ class TopoMapper:
         self.part_id = self._birth()
         self.local.settle(self.part_id)
         if known:
-            self._look_for_place()
+            self.lost, self._news = True, News.LOST
 
     def _move(self, before: SlamUpdate, after: SlamUpdate) -> None:
         """Let the covariance of T_node_base grow by the motion since the previous scan."""
@@ -199,8 +230,7 @@ class TopoMapper:
         self._align_associated()
         for seam in self._neighbours.seams_at(node_id, self.graph, self.local, self._require().grid):
             self.graph.add_edge(seam)
-        if self._recogniser is not None:
-            self._recogniser.at_node(self, born=False)
+        self._news = News.NODE
 
     def _create(self) -> None:
         """Make a node here, with its odometry edge and all near-neighbour edges that help."""
@@ -214,8 +244,7 @@ class TopoMapper:
         here = node_id, self.graph, self.local, self._require().grid
         for edge in chain(self._neighbours.edges_for(*here), self._neighbours.seams_at(*here)):
             self.graph.add_edge(edge)
-        if self._recogniser is not None:
-            self._recogniser.at_node(self, born=True)
+        self._news = News.NODE
 
     def _birth(self) -> int:
         now = self._require()
@@ -275,6 +304,94 @@ class TopoMapper:
             for each in taken:
                 self._recogniser.place_taken(each.node_id, each.place)
 
+    # -- what is recognised ---------------------------------------------------------------------------------
+
+    def _recognise(self) -> None:
+        """Let the recogniser of places work, and carry out what it decides."""
+        if self._recogniser is None:
+            return
+        for decision in self._recogniser.update(self._situation()):
+            match decision:
+                case Closed():
+                    self._close(decision, self._recogniser)
+                case Revoked(edge_ids):
+                    self.revoke(*edge_ids)
+                case Located():
+                    self._join(decision, self._recogniser)
+                case Confirmed(found):
+                    self._anchor_found(found)
+                case NotFound():
+                    self.found(known=False)
+
+    def _situation(self) -> Situation:
+        now, here_id, sure = self._require(), self._associated_id, self.local.sure()
+        if self._news is News.NODE and not self.lost and here_id in sure:
+            self._sure_m = self.travelled_m
+        here = self.local.standings[here_id]
+        return Situation(
+            here_id,
+            here.T_grid_node,
+            here.covariance,
+            now.slam.T_grid_base,
+            self.travelled_m,
+            self.turned_rad,
+            now.grid,
+            self.travelled_m - self._sure_m,
+            sure,
+            self.keeper.hits,
+            self.config.occupied_from,
+            self._news,
+            self.lost,
+            self.part_id,
+        )
+
+    def _close(self, closed: Closed, recogniser: Recogniser) -> None:
+        """Commit closures that belong together; who is unsure of his node stands at the nearest found."""
+        edges = [
+            self.close_loop(each.here_id, each.found.node_id, each.T_here_node, each.covariance)
+            for each in closed.closures
+            if each.informs
+        ]
+        recogniser.committed(closed, edges)
+        found = [each.found for each in closed.closures]
+        for each in found:
+            self._anchor_found(each)
+        if not self.local.standings[self._associated_id].sure:
+            nearest = min(found, key=self._gap_m)
+            self._stand_at(nearest)
+            self._anchor_found(nearest)
+
+    def _join(self, located: Located, recogniser: Recogniser) -> None:
+        """Join the robot's part of the map to where it was found, and stand there if it is near."""
+        found, here_id = located.found, self._associated_id
+        here = self.local.standings[here_id]
+        T_here_node = between(here.T_grid_node, found.T_grid_node)
+        doubt = reversed_covariance(here.T_grid_node, here.covariance)
+        covariance = chain_covariance(doubt, found.T_grid_node, found.covariance)
+        edge = self.close_loop(here_id, found.node_id, T_here_node, covariance)
+        recogniser.committed(located, [edge])
+        if self.lost:
+            self.adopt_level(self.graph.node(found.node_id).level)
+            self._stand_at(found)
+        self._anchor_found(found)
+        self.found()
+
+    def _stand_at(self, found: Found) -> None:
+        """Make a node that was found the associated one if the robot is at it.
+
+        From further off an odometry edge would begin there that nobody has driven.
+        """
+        if self._gap_m(found) <= self.config.new_node_distance_m:
+            self.relocate(found.node_id, found.T_grid_node, found.covariance)
+
+    def _anchor_found(self, found: Found) -> None:
+        self.local.anchor_found(found.node_id, found.T_grid_node, found.covariance)
+
+    def _gap_m(self, found: Found) -> float:
+        """Return how far the robot is from a node that was found."""
+        x, y, _ = (found.T_grid_node - self._require().slam.T_grid_base).tolist()
+        return math.hypot(x, y)
+
     # -- closures and components ----------------------------------------------------------------------------
 
     def standing(self, node_id: int) -> Standing | None:
@@ -329,8 +446,7 @@ class TopoMapper:
         node_id, self._lift = self._birth(), None
         self.graph.add_edge(lift.edge_to(node_id, self._require().slam, COVARIANCE_FLOOR))
         self.local.settle(node_id)
-        if self._recogniser is not None:
-            self._recogniser.window_changed(self)
+        self._news = News.WINDOW
 
     def adopt_level(self, level: int) -> None:
         """Put what was mapped since the robot was lost on the level on which it proves to be."""
@@ -354,11 +470,6 @@ class TopoMapper:
     def found(self, *, known: bool = True) -> None:
         """Say that the robot knows its place again, or that this must be a place not mapped yet."""
         self.lost, self.known_place = False, known
-
-    def _look_for_place(self) -> None:
-        self.lost = True
-        if self._recogniser is not None:
-            self._recogniser.lost(self)
 
     def relocate(self, node_id: int, T_grid_node: Pose, covariance: Covariance) -> None:
         """Make a known node the associated one because it was recognised in the window."""

@@ -2,9 +2,12 @@
 
 import heapq
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from lemtomap.se2 import Pose, compose
 from lemtomap.topo.graph import Edge, Leg, Node
 from lemtomap.topo.store import TopoStore
 
@@ -156,3 +159,15 @@ class PagedGraph:
         while len(self._edges) > self._capacity:
             dropped_id, _ = self._edges.popitem(last=False)
             self._ways.pop(dropped_id, None)
+
+
+def chain(reached: Mapping[int, Reached]) -> dict[int, Pose]:
+    """Return the pose of every reached node in the frame of the start."""
+    poses: dict[int, Pose] = {}
+    for node_id, way in reached.items():
+        if way.via is None:
+            poses[node_id] = np.zeros(3)
+        else:
+            before = way.via.other(node_id)
+            poses[node_id] = compose(poses[before], way.via.seen_from(before))
+    return poses

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose
 from lemtomap.topo.graph import Edge, OpeningState, detour
-from lemtomap.topo.loops.places import chain
-from lemtomap.topo.paging import PagedGraph
+from lemtomap.topo.paging import PagedGraph, chain
 from lemtomap.topo.place import decode_place
 from lemtomap.topo.store import TopoStore
 

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import adjoint, between, compose
-from lemtomap.topo.loops.cases import Situation
 from lemtomap.topo.loops.config import GateConfig, LoopConfig
 from lemtomap.topo.loops.descriptor import describe, distances
 from lemtomap.topo.loops.matcher import SearchBox
 from lemtomap.topo.loops.outlook import Outlook
 from lemtomap.topo.loops.places import PlaceBook
+from lemtomap.topo.recognition import Situation
 
 USUAL_UNLIKENESS = 45.0  # descriptor distance of two visits to one place
 

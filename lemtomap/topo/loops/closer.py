@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo.loops.audit import Audit
 from lemtomap.topo.loops.candidates import ranked, search_box, spaced, way_m
-from lemtomap.topo.loops.cases import Closure, Confirmed, Situation, Task
+from lemtomap.topo.loops.cases import Task
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis
 from lemtomap.topo.loops.judge import Judge
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
 from lemtomap.topo.loops.outlook import Outlook
-from lemtomap.topo.loops.places import PlaceBook, chain
-from lemtomap.topo.paging import PagedGraph
+from lemtomap.topo.loops.places import PlaceBook
+from lemtomap.topo.paging import PagedGraph, chain
+from lemtomap.topo.recognition import Closed, Closure, Confirmed, Found, Situation
 from lemtomap.types import EdgeType
 
 TRIALS_KEPT = 4096
@@ -76,11 +77,9 @@ class LoopCloser:
             self._apart = self.graph.store.count("node") > len(outlook)
         return self._apart
 
-    def at_node(self, situation: Situation, points_grid: NDArray[np.float64]) -> None:
-        """Look for known places here: call when a node was made or became the associated one.
-
-        points_grid: averaged hits in the window, float (N, 2), metres, grid frame.
-        """
+    def at_node(self, situation: Situation) -> None:
+        """Look for known places here: call when a node was made or became the associated one."""
+        points_grid = situation.points_grid()
         self._renew_outlook(situation.here_id)
         self.hypotheses.drop_old(situation.travelled_m)
         chosen = self._candidates(situation, points_grid)
@@ -104,7 +103,7 @@ class LoopCloser:
         while len(self._tasks) > 4 * self.config.hearing:
             self._tasks.popleft()
 
-    def update(self) -> list[Closure]:
+    def update(self) -> Closed | None:
         """Work a slice; return the closures that became certain."""
         if self._outlook is not None:
             self._outlook.advance(self.config.gate.outlook_per_update)
@@ -113,7 +112,7 @@ class LoopCloser:
         while self._tasks and budget > 0:
             budget -= self._work(self._tasks[0], budget)
         hypothesis = self.hypotheses.certain()
-        return [] if hypothesis is None else self._commit(hypothesis)
+        return None if hypothesis is None else self._commit(hypothesis)
 
     def _call_witness(self, situation: Situation, points_grid: NDArray[np.float64]) -> None:
         """Search a place that must be near the robot by closures alone."""
@@ -281,7 +280,7 @@ class LoopCloser:
         off = between(situation.T_grid_here, match.T_grid_place)
         near = np.hypot(off[0], off[1]) <= self.config.agree_m and abs(off[2]) <= self.config.agree_rad
         if near:
-            self.confirmed.append(Confirmed(task.node_id, match.T_grid_place, match.covariance))
+            self.confirmed.append(Confirmed(Found(task.node_id, match.T_grid_place, match.covariance)))
         return bool(near)
 
     def _hear(self, task: Task, hypothesis: Hypothesis) -> None:
@@ -304,23 +303,14 @@ class LoopCloser:
                 self._tasks.append(Task(node_id, situation, task.reference, box, over_edges_m, hypothesis))
         hypothesis.heard = not heard
 
-    def _commit(self, hypothesis: Hypothesis) -> list[Closure]:
+    def _commit(self, hypothesis: Hypothesis) -> Closed:
         """Make a certain hypothesis closures, one for each sighting, and start with a fresh outlook."""
-        closures = [
-            Closure(
-                s.here_id,
-                s.node_id,
-                s.T_here_node,
-                s.covariance,
-                s.match.T_grid_place,
-                s.match,
-                s.informs,
-                s.evidence,
-            )
+        closures = tuple(
+            Closure(s.here_id, s.T_here_node, s.covariance, s.found, s.informs, s.evidence)
             for s in hypothesis.sightings
-        ]
+        )
         self.start_afresh()
-        return closures
+        return Closed(closures)
 
     def start_afresh(self) -> None:
         """Forget beliefs and searches: the graph they rest on has changed."""

@@ -14,6 +14,7 @@ from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo.graph import Covariance
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.matcher import Match
+from lemtomap.topo.recognition import Found
 
 Around = Callable[[int], Mapping[int, Pose]]
 """T_node_other of the nodes around a node, by the map's own edges."""
@@ -35,6 +36,11 @@ class Sighting:
     """Whether the robot's own node stood surely in the window."""
     evidence: float = 1.0
     """How much it counts, 0..1."""
+
+    @property
+    def found(self) -> Found:
+        """Where the node stands in the window by this sighting."""
+        return Found(self.node_id, self.match.T_grid_place, self.match.covariance)
 
 
 @dataclass(slots=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lemtomap.se2 import Pose, between, compose
-from lemtomap.topo.graph import Covariance, chain_covariance
-from lemtomap.topo.loops.cases import Task, reversed_covariance
+from lemtomap.topo.graph import Covariance, chain_covariance, reversed_covariance
+from lemtomap.topo.loops.cases import Task
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Sighting
 from lemtomap.topo.loops.matcher import Match

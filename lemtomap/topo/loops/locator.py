@@ -11,12 +11,12 @@ Two that fit alike are two: then the robot stays lost, for a wrong answer is wor
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between, compose, inverse, transform
-from lemtomap.topo.graph import Covariance
 from lemtomap.topo.loops.config import LocatorConfig, LoopConfig
 from lemtomap.topo.loops.descriptor import describe
 from lemtomap.topo.loops.fitting import kernels as fitting
@@ -24,8 +24,9 @@ from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.loops.lineup import LineUp
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
 from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
-from lemtomap.topo.loops.places import Company, PlaceBook, chain, kept
-from lemtomap.topo.paging import PagedGraph
+from lemtomap.topo.loops.places import Company, PlaceBook, kept
+from lemtomap.topo.paging import PagedGraph, chain
+from lemtomap.topo.recognition import Found, Situation
 from lemtomap.types import GridView
 
 Points = NDArray[np.float64]
@@ -44,16 +45,16 @@ class Look:
     points_grid: Points
     """Averaged hits in the window, float64 (N, 2), metres."""
 
-
-@dataclass(frozen=True, slots=True)
-class Located:
-    """A known node found in the window for certain."""
-
-    node_id: int
-    T_grid_node: Pose
-    covariance: Covariance
-    """float64 (3, 3), axes of the node."""
-    match: Match
+    @classmethod
+    def of(cls, situation: Situation) -> Self:
+        """Look round in a situation."""
+        return cls(
+            situation.T_grid_base,
+            situation.travelled_m,
+            situation.turned_rad,
+            situation.grid,
+            situation.points_grid(),
+        )
 
 
 @dataclass(slots=True)
@@ -111,7 +112,7 @@ class Locator:
         if view.has_structure and self.line_up.is_over and self._search is None:
             self.line_up.begin(view.all_round_base, view.descriptor, look.travelled_m, look.turned_rad)
 
-    def update(self, budget: int) -> Located | None:
+    def update(self, budget: int) -> Found | None:
         """Search on for a slice (bound evaluations); return where the robot is once that is certain."""
         while budget > 0 and (self._search is not None or not self.line_up.is_over):
             budget -= self._work(budget)
@@ -245,7 +246,7 @@ class Locator:
                 kept.append(guess)
         self.guesses = sorted(kept, key=lambda each: -each.fit)[: self.config.guesses]
 
-    def _certain(self) -> Located | None:
+    def _certain(self) -> Found | None:
         """Return the guess that keeps fitting while no other does; None while there is doubt."""
         config, view = self.config, self._view
         if view is None or not self.guesses or not self.line_up.heard:
@@ -262,7 +263,7 @@ class Locator:
         moved_m = view.look.travelled_m - best.from_m
         if moved_m < needed_m and view.look.turned_rad - best.from_rad < config.moved_rad:
             return None
-        return Located(best.node_id, best.T_grid_node, best.match.covariance, best.match)
+        return Found(best.node_id, best.T_grid_node, best.match.covariance)
 
     def _beats(self, best: Guess, rival: Guess, view: "_View") -> bool:
         """Tell whether a guess fits clearly better, or alone explains what the other never makes up for."""

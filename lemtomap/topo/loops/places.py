@@ -8,10 +8,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, compose, transform
+from lemtomap.se2 import Pose, transform
 from lemtomap.topo.loops.cells import thinned
 from lemtomap.topo.loops.descriptor import BYTES, unpack
-from lemtomap.topo.paging import PagedGraph, Reached
+from lemtomap.topo.paging import PagedGraph, chain
 from lemtomap.topo.place import decode_place
 
 T = TypeVar("T")
@@ -104,18 +104,6 @@ class PlaceBook:
         stride = max(1.0, len(points) / self._search_points)
         rows = np.minimum(np.arange(0, len(points), stride), len(points) - 1).astype(np.int64)
         return np.ascontiguousarray(points[np.unique(rows)])
-
-
-def chain(reached: dict[int, Reached]) -> dict[int, Pose]:
-    """Return the pose of every reached node in the frame of the start."""
-    poses: dict[int, Pose] = {}
-    for node_id, way in reached.items():
-        if way.via is None:
-            poses[node_id] = np.zeros(3)
-        else:
-            before = way.via.other(node_id)
-            poses[node_id] = compose(poses[before], way.via.seen_from(before))
-    return poses
 
 
 def kept(cache: OrderedDict[int, T], key: int, size: int, make: Callable[[int], T]) -> T:

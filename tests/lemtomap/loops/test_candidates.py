@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import compose
+from lemtomap.topo.align import HitMap
 from lemtomap.topo.graph import Edge, Leg
 from lemtomap.topo.loops.candidates import search_box, spaced
-from lemtomap.topo.loops.cases import Situation
 from lemtomap.topo.loops.config import GateConfig
 from lemtomap.topo.loops.outlook import Outlook
+from lemtomap.topo.recognition import Situation
 from lemtomap.types import EdgeType, GridView
 
 GATE = GateConfig()
@@ -39,7 +40,19 @@ def arrived(count, drift=(0.0, 0.0, 0.0)):
     outlook = Outlook(Ring(count), count, GATE)
     outlook.advance(10 * count)
     T_grid_here = compose(ROBOT, np.array(drift))
-    return outlook, Situation(count, T_grid_here, np.eye(3) * 1e-4, ROBOT, 1.0 * count, GRID, 0.0, {count})
+    return outlook, Situation(
+        here_id=count,
+        T_grid_here=T_grid_here,
+        covariance=np.eye(3) * 1e-4,
+        T_grid_base=ROBOT,
+        travelled_m=1.0 * count,
+        turned_rad=0.0,
+        grid=GRID,
+        unsure_m=0.0,
+        measured={count},
+        hits=HitMap(),
+        occupied_from=50,
+    )
 
 
 def is_inside(box, T_grid_place):
