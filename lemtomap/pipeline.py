@@ -1,26 +1,118 @@
-"""The mapping half of the thesis' figure 3-1: a scan meets the window, then the topological map."""
+"""The mapping half of the thesis' figure 3-1: a scan meets the window, then the topological map.
 
+scan, odometry -> window SLAM -> was the robot moved? -> topological SLAM -> recognised places -> map view
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lemtomap.displacement import Watch
 from lemtomap.grid import GridSlam
+from lemtomap.topo.events import LevelChanged, NavEvent
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.types import GridView, MapView, Odometry, Scan, SlamUpdate
 
 
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """What became of one scan."""
+
+    slam: SlamUpdate | None = None
+    """What it told the window SLAM; None for one taken in the air."""
+    displaced: str = ""
+    """Why somebody must have moved the robot, empty when nobody has: the map goes on in a part of its own."""
+    used: bool = False
+    """Whether it went into the map."""
+
+
 class Mapper:
-    """Scan and odometry in, map view out. Owned by the mapping thread."""
+    """Scan and odometry in, map view out. Owned by the mapping thread.
 
-    def __init__(self, slam: GridSlam, topo: TopoMapper) -> None:
-        self.slam = slam
+    Holds: a robot that was carried or pushed away begins with an empty window, in a part of the map that only
+    a recognised place joins to the rest.
+    """
+
+    def __init__(self, make_slam: Callable[[], GridSlam], topo: TopoMapper, *, watched: bool = True) -> None:
+        """`make_slam` makes a window SLAM, one for each window begun anew. `watched`: where wheels and laser
+        say different things, somebody may have moved the robot. Not so on a recorded drive whose wheels leap,
+        nor in a metric layer that keeps all of its grid.
+        """
         self.topo = topo
+        self._make_slam = make_slam
+        self._slam = make_slam()
+        self._watch = Watch(topo.config.watch)
+        self._is_watched = watched
         self._grid: GridView | None = None
+        self._disowned: MapView | None = None
+        """The last view, worth nothing any more, until there is another."""
 
-    def update(self, scan: Scan, odometry: Odometry) -> SlamUpdate:
-        """Use one scan; odometry is the base at the scan's stamp."""
-        update = self.slam.update(scan, odometry)
-        if self._grid is None or update.integrated:
-            self._grid = self.slam.view()  # between integrations the window does not change
-        self.topo.update(update, self._grid, self.slam.points_base())
-        return update
+    def update(
+        self,
+        scan: Scan,
+        odometry: Odometry,
+        hits_base: NDArray[np.floating] | None = None,
+        *,
+        lifted: bool = False,
+        events: Iterable[NavEvent] = (),
+    ) -> Mapped:
+        """Use one scan; odometry is the base at the scan's stamp.
+
+        hits_base: the scan's hits, float (N, 2), metres, base frame at its stamp, from whoever knows the
+        odometry at each beam; None: de-skewed by the velocity, as for the window.
+        lifted: the wheels hang in the air; events: what navigation found out since the scan before.
+        """
+        if lifted:  # nothing is mapped there
+            self._watch.lift(scan.stamp_s)
+            self._disown()
+            return Mapped()
+        carried = self._watch.put_down(scan.stamp_s)
+        if carried:
+            self._lose()
+        for event in events:
+            self._apply(event)
+        slam = self._slam.update(scan, odometry)
+        hits = self._slam.points_base() if hits_base is None else hits_base
+        moved = self._watch.displaced(slam, odometry, hits) if self._is_watched else ""
+        if moved:  # this scan may show both places: the new window begins with the next
+            self._lose()
+            return Mapped(slam, moved)
+        if self._grid is None or slam.integrated:
+            self._grid = self._slam.view()  # between integrations the window does not change
+        self.topo.update(slam, self._grid, hits, self._watch.fit)
+        self._disowned = None
+        return Mapped(slam, carried, used=True)
 
     def view(self) -> MapView:
-        """Return an immutable snapshot; needs at least one scan."""
-        return self.topo.view(self.slam.particles())
+        """Return an immutable snapshot, of quality 0 while the robot is in the air or was just moved.
+
+        Raises NotStarted before the first scan.
+        """
+        return self._disowned or self.topo.view(self._slam.particles())
+
+    def close(self) -> None:
+        """Write everything and close the map file."""
+        self.topo.close()
+
+    def _apply(self, event: NavEvent) -> None:
+        if not isinstance(event, LevelChanged):
+            self.topo.apply(event)
+        elif event.level != self.topo.level:
+            self._begin_window()
+            self.topo.change_level(event.level)
+
+    def _lose(self) -> None:
+        """Begin with an empty window, in a part of the map of its own."""
+        self._disown()
+        self._begin_window()
+        self.topo.lose()
+
+    def _disown(self) -> None:
+        if self._disowned is None and self.topo.started:
+            self._disowned = replace(self.view(), quality=0.0)
+
+    def _begin_window(self) -> None:
+        self._slam, self._grid = self._make_slam(), None
+        self._watch.restart()

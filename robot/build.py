@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from lemtomap.errors import BadSetting
-from lemtomap.grid import DEFAULT_SLAM, SLAMS
+from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam
 from lemtomap.nav.navigator import Navigator
+from lemtomap.pipeline import Mapper
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.pruning import prune
@@ -14,7 +15,7 @@ from robot.base import BaseStep
 from robot.config import RobotConfig
 from robot.core import RobotCore
 from robot.exchange import Exchange
-from robot.mapping import GridSlam, MappingStep
+from robot.mapping import MappingStep
 from robot.navigating import NavigationStep
 
 
@@ -36,7 +37,7 @@ def build_core(
     if known:
         prune(store)
     recogniser = None if slam == "gmapping" else LoopRecogniser()  # a growing grid is too large to search
-    mapper = TopoMapper(config.topo, store, recogniser=recogniser)
-    mapping = MappingStep(lambda: build_slam(slam, config, seed), mapper, exchange)
+    topo = TopoMapper(config.topo, store, recogniser=recogniser)
+    mapping = MappingStep(Mapper(lambda: build_slam(slam, config, seed), topo), exchange)
     navigation = NavigationStep(Navigator(config.nav), exchange, lambda: TopoReader(map_path))
     return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)

@@ -111,7 +111,7 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
         recogniser = None if options.slam == "gmapping" else LoopRecogniser()
         topo = TopoMapper(TopoConfig(), store, recogniser=recogniser)
         try:
-            drive = _drive(log, Mapper(slam, topo), slam, bar)
+            drive = _drive(log, Mapper(lambda: slam, topo, watched=False), slam, bar)
             final = map_on_path(topo, grid.path()) if isinstance(grid, GrowingGmapping) else final_map(topo)
             view = topo.view()
         finally:
@@ -145,11 +145,11 @@ def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
     compiling = ExitStack()
     compiling.enter_context(first_use(bar))
     for index, (odometry, scan) in enumerate(log):
-        update = mapper.update(scan, odometry)
+        update = mapper.update(scan, odometry).slam
         if index == FIRST_SCANS:
             compiling.close()
         drive.stamps_s.append(scan.stamp_s)
-        if update.integrated:
+        if update is not None and update.integrated:
             drive.updates += 1
             drive.walls.add(index, slam.points_base())
         now_s = time.perf_counter()

@@ -1,111 +1,41 @@
 """The mapping part of the robot: a scan in, a snapshot of the map out. One scan at a time."""
 
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Protocol
-
-import numpy as np
-from numpy.typing import NDArray
-
-from lemtomap.topo.events import LevelChanged
-from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.whereabouts import Watch
-from lemtomap.types import GridView, MapView, Odometry, Scan, SlamUpdate
+from lemtomap.pipeline import Mapper
+from lemtomap.types import MapView
 from robot.exchange import Exchange, Level, TimedScan
 
 
-class GridSlam(Protocol):
-    """Any of the window or grid SLAMs."""
-
-    def update(self, scan: Scan, odometry: Odometry) -> SlamUpdate:
-        """Take one scan."""
-        ...
-
-    def view(self) -> GridView:
-        """Return the best window."""
-        ...
-
-    def particles(self) -> NDArray[np.float64]:
-        """Return float64 (N, 3), T_grid_base of each particle."""
-        ...
-
-
 class MappingStep:
-    """Rolling-window SLAM, then topological SLAM; a new window and a new part of the map when carried."""
+    """Carries the mail between the mailboxes and the mapper."""
 
-    def __init__(self, make_slam: Callable[[], GridSlam], mapper: TopoMapper, exchange: Exchange) -> None:
-        self.slam, self.mapper = make_slam(), mapper
+    def __init__(self, mapper: Mapper, exchange: Exchange) -> None:
+        self.mapper = mapper
         self.scans = 0
         """How many scans went into the map."""
-        self._make_slam = make_slam
         self._exchange = exchange
-        self._watch = Watch(mapper.config.watch)
-        self._lifted_since_s: float | None = None
+        self._published: MapView | None = None
         self._lost = False
-        self._associated_id = 0
 
     def step(self, timed: TimedScan) -> None:
-        """Map one scan and publish what is known now; a robot in the air maps nothing."""
-        stamp_s = timed.scan.stamp_s
-        if timed.lifted:
-            self._hold(stamp_s)
-            return
-        if self._lifted_since_s is not None:
-            carried = stamp_s - self._lifted_since_s >= self._watch.config.carried_s
-            self._lifted_since_s = None
-            if carried:
-                self._lose(stamp_s, "carried elsewhere, or put back: wheels hung in the air")
-        for event in self._exchange.nav_events.drain():
-            if isinstance(event, LevelChanged):
-                self._change_level(stamp_s, event.level)
-            else:
-                self.mapper.apply(event)
-        update = self.slam.update(timed.scan, timed.odometry)
-        moved = self._watch.displaced(update, timed.odometry, timed.sighting.hits_base)
-        if moved:  # this scan may show both places: the new window begins with the next
-            self._lose(stamp_s, moved)
-            return
-        self.mapper.fit = self._watch.fit
-        self.mapper.update(update, self.slam.view(), timed.sighting.hits_base)
-        self.scans += 1
-        self._publish(self.mapper.view(self.slam.particles()))
-
-    def _hold(self, stamp_s: float) -> None:
-        """Wait in the air; whoever looks at the map is told that the pose is worth nothing."""
-        if self._lifted_since_s is not None:
-            return
-        self._lifted_since_s = stamp_s
-        self._disown()
-
-    def _disown(self) -> None:
-        """Say that the pose published last is worth nothing any more; there is no other yet."""
-        view = self._exchange.map_view.get()
-        if view is not None:
-            self._exchange.map_view.put(replace(view, quality=0.0))
-
-    def _lose(self, stamp_s: float, why: str) -> None:
-        """Begin with an empty window, in a part of the map of its own."""
-        self._exchange.note(stamp_s, "mapping", why, Level.WARN)
-        self._disown()
-        self._begin_window()
-        self.mapper.lose()
-
-    def _change_level(self, stamp_s: float, level: int) -> None:
-        """Begin with an empty window on another level, in the same part of the map."""
-        if level == self.mapper.level:
-            return
-        self._exchange.note(stamp_s, "mapping", f"on level {level} now")
-        self._begin_window()
-        self.mapper.change_level(level)
-
-    def _begin_window(self) -> None:
-        self.slam = self._make_slam()
-        self._watch.restart()
+        """Map one scan and publish what is known now."""
+        level, stamp_s = self.mapper.topo.level, timed.scan.stamp_s
+        events = [] if timed.lifted else self._exchange.nav_events.drain()
+        hits_base = timed.sighting.hits_base
+        mapped = self.mapper.update(timed.scan, timed.odometry, hits_base, lifted=timed.lifted, events=events)
+        self.scans += mapped.used
+        if mapped.displaced:
+            self._exchange.note(stamp_s, "mapping", mapped.displaced, Level.WARN)
+        if self.mapper.topo.level != level:
+            self._exchange.note(stamp_s, "mapping", f"on level {self.mapper.topo.level} now")
+        if mapped.used or self._published is not None:
+            self._publish(self.mapper.view())
 
     def _publish(self, view: MapView) -> None:
-        if view.associated_id != self._associated_id:
-            self._associated_id = view.associated_id
-            self.mapper.store.commit()  # who plans from a node must find it and its edges in the file
+        before, self._published = self._published, view
+        if view is before:
+            return
+        if before is None or view.associated_id != before.associated_id:
+            self.mapper.topo.store.commit()  # who plans from a node must find it and its edges in the file
         self._exchange.map_view.put(view)
         if view.lost != self._lost:
             self._lost = view.lost
@@ -114,7 +44,7 @@ class MappingStep:
     def _tell(self, view: MapView) -> None:
         if view.lost:
             text, level = "lost: looking for the place", Level.WARN
-        elif self.mapper.known_place:
+        elif self.mapper.topo.known_place:
             text, level = "found again", Level.INFO
         else:
             text, level = "nothing here looks like the map: mapping on as a new part of it", Level.WARN

@@ -95,7 +95,8 @@ class RunFiles(Onlooker):
         self.look(now_s)
         self.close()
         view = self._core.exchange.map_view.get()
-        final = final_map(self._core.mapping.mapper, whole_drive=whole_drive) if view is not None else None
+        topo = self._core.mapping.mapper.topo
+        final = final_map(topo, whole_drive=whole_drive) if view is not None else None
         self._core.close()
         summary: dict[str, Any] = {**told, "run_s": now_s}
         if final is not None and view is not None:

@@ -66,14 +66,14 @@ class Driven:
     """A log driven through, with all that is asked of it afterwards."""
 
     def __init__(self, run: Run, log: Log, folder: Path, stop: int | None = None) -> None:
-        slam = SLAMS[DEFAULT_SLAM](SlamConfig(max_range_m=run.max_range_m, particles=1), 0)
+        config = SlamConfig(max_range_m=run.max_range_m, particles=1)
         self.store = TopoStore.create(folder / "map.lemto", durable=False)
         self.recogniser = LoopRecogniser()
         self.topo = TopoMapper(TopoConfig(), self.store, recogniser=self.recogniser)
         self.false_edge_id = 0
         self.taken_back_m: float | None = None
         self._injected_m = 0.0
-        mapper = Mapper(slam, self.topo)
+        mapper = Mapper(lambda: SLAMS[DEFAULT_SLAM](config, 0), self.topo, watched=False)
         inject_at = None if run.inject_at is None else round(run.inject_at * (len(log) - run.start))
         self.update_s: list[float] = []
         begun_s = time.process_time()

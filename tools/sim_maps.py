@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from lemtomap.displacement import RIGHT_M, RIGHT_RAD
 from lemtomap.grid import SlamConfig, WindowMatcher
+from lemtomap.pipeline import Mapper
 from lemtomap.se2 import Pose, between, compose, transform
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.loops import LoopRecogniser
@@ -19,7 +21,6 @@ from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.place import decode_place
 from lemtomap.topo.pruning import prune
 from lemtomap.topo.store import TopoStore
-from lemtomap.topo.whereabouts import RIGHT_M, RIGHT_RAD
 from lemtomap.types import MapView
 from robot.exchange import Exchange
 from robot.mapping import MappingStep
@@ -67,10 +68,11 @@ class JudgedMap:
         store = make(path, durable=False)
         self.pruned = prune(store)
         self.recogniser = LoopRecogniser()
-        self.mapper = TopoMapper(TopoConfig(), store, recogniser=self.recogniser)
+        self.topo = TopoMapper(TopoConfig(), store, recogniser=self.recogniser)
         self.born: dict[int, Pose] = load_born(path)
         self.exchange = Exchange()
-        self.step = MappingStep(lambda: WindowMatcher(SlamConfig()), self.mapper, self.exchange)
+        mapper = Mapper(lambda: WindowMatcher(SlamConfig()), self.topo)
+        self.step = MappingStep(mapper, self.exchange)
         self.score = Score()
         self._world = world
         self._at_birth_m: dict[int, float] = dict.fromkeys(self.born, -math.inf)
@@ -135,7 +137,7 @@ class JudgedMap:
         seen = [ids[k] for k in near if self._in_sight(T_world_base, places[k])]
         way_m = self.score.path_m
         ages_m = {i: way_m - self._at_birth_m[i] for i in seen}
-        known = self.mapper.graph.reach(self.view.associated_id, APART_M)
+        known = self.topo.graph.reach(self.view.associated_id, APART_M)
         old = [i for i, age_m in ages_m.items() if age_m >= OLD_M]
         self._revisits.look(
             way_m, max(ages_m.values(), default=None), known=any(node_id in known for node_id in old)
@@ -159,7 +161,7 @@ class JudgedMap:
         self.score.brief = self._revisits.brief
         self.score.closures = len(self.recogniser.closures)
         self.score.pruned = len(self.pruned)
-        self.score.nodes = self.mapper.store.count("node")
+        self.score.nodes = self.topo.store.count("node")
         self.step.close()
         self._born_path.write_text(json.dumps({str(i): T.tolist() for i, T in self.born.items()}))
         return self.score

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
+from lemtomap.displacement import WatchConfig
 from lemtomap.errors import BadSetting
 from lemtomap.topo.align import MatchConfig
-from lemtomap.topo.whereabouts import WatchConfig
 
 
 @dataclass(frozen=True, slots=True)

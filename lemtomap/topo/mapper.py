@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.displacement import pose_quality
 from lemtomap.errors import LemtomapError
 from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo import kernels
@@ -35,7 +36,6 @@ from lemtomap.topo.snapshots import Snapshots
 from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
 from lemtomap.topo.undoing import take_back
-from lemtomap.topo.whereabouts import pose_quality
 from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
 
 
@@ -92,8 +92,6 @@ class TopoMapper:
         """Way of the base since the start, metres."""
         self.turned_rad = 0.0
         """Turning of the base since the start, either way."""
-        self.fit = 1.0
-        """How well the latest scan fits the window, as a share of what is usual; set by whoever watches."""
         self.lost = False
         """The robot does not know where in the map it is; it maps on in a part of its own."""
         self.known_place = True
@@ -105,6 +103,7 @@ class TopoMapper:
             recogniser.attach(self.graph)
         self._news = News.NONE
         self._sure_m = 0.0
+        self._fit = 1.0
         self._neighbours = NeighbourFinder(config)
         self._associated_id = 0
         self._drift: Covariance = np.zeros((3, 3))
@@ -135,16 +134,26 @@ class TopoMapper:
         now = self._require()
         return now.slam, now.grid
 
+    @property
+    def started(self) -> bool:
+        """Whether the robot stands at a node: not before the first scan, nor between two windows."""
+        return self._now is not None
+
     def update(
-        self, slam: SlamUpdate, grid: GridView, points_base: NDArray[np.floating] | None = None
+        self,
+        slam: SlamUpdate,
+        grid: GridView,
+        points_base: NDArray[np.floating] | None = None,
+        fit: float = 1.0,
     ) -> None:
         """Take in what one scan told the window SLAM.
 
         `grid` is the window after this scan (an older snapshot will do between integrations);
         `points_base` are the scan's hits, float (N, 2), metres, base frame. Without them the window's cells
-        must do for localisation data.
+        must do for localisation data. `fit`: how well the scan fits the window, as a share of what is usual.
         """
         before, self._now, self._news = self._now, _Now(slam, grid), News.NONE
+        self._fit = fit
         self.keeper.observe(slam.T_grid_base, points_base)
         if before is None:
             self._begin()
@@ -497,7 +506,7 @@ class TopoMapper:
         if self.lost:
             return 0.0
         born, measured = self.local.standings[self._associated_id].born, self._transform.measured
-        return pose_quality(self._drift, self.fit, born=born, measured=measured, config=self.config.watch)
+        return pose_quality(self._drift, self._fit, born=born, measured=measured, config=self.config.watch)
 
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""

@@ -1,5 +1,6 @@
 """What the whole promises, in worlds made up for it: the parts may all be right and the sum still wrong."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +12,7 @@ from lemtomap.nav.types import NavState
 from lemtomap.pipeline import Mapper
 from lemtomap.se2 import between, compose, inverse
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.events import LevelChanged
 from lemtomap.topo.graph import Edge
 from lemtomap.topo.learning import learn
 from lemtomap.topo.loops import LoopRecogniser
@@ -24,22 +26,32 @@ from tests.lemtomap.nav.world import run
 
 ROUND = 18.0, 12.0
 LAPS = way_round(*ROUND)
+WALLS = corridor_round(*ROUND)
 
 
-class Mapped:
-    """A building driven through from an empty map, and where each node truly is."""
+class Building:
+    """A building mapped from an empty map on, and where each node truly is."""
 
-    def __init__(self, path, walls, folder):
+    def __init__(self, folder):
         self.store = TopoStore.create(folder / "map.lemto", durable=False)
-        self.recogniser = LoopRecogniser()
-        topo = TopoMapper(TopoConfig(), self.store, recogniser=self.recogniser)
-        self.mapper = Mapper(WindowMatcher(SlamConfig()), topo)
+        self.topo = TopoMapper(TopoConfig(), self.store, recogniser=LoopRecogniser())
+        self.mapper = Mapper(lambda: WindowMatcher(SlamConfig()), self.topo)
         self.born = {}
-        for truth, odometry, scan in drive(path, walls, seed=2, odometry_noise=0.05):
-            self.mapper.update(scan, odometry)
-            self.born.setdefault(topo.associated_id, compose(truth, inverse(topo.T_node_base)))
+
+    def map(self, path, walls=WALLS, **kinds):
+        """Yield (true pose, what became of the scan) along poses."""
+        for truth, odometry, scan in drive(path, walls, seed=2, odometry_noise=0.05, **kinds):
+            mapped = self.mapper.update(scan, odometry)
+            if mapped.used:
+                T_base_node = inverse(self.topo.T_node_base)
+                self.born.setdefault(self.topo.associated_id, compose(truth, T_base_node))
+            yield truth, mapped
+
+    def closures(self):
+        return [edge for edge in self.store.edges() if edge.type is EdgeType.LOOP_CLOSING]
 
     def off(self, edge):
+        """How an edge differs from the truth."""
         true = between(self.born[edge.source_id], self.born[edge.target_id])
         return between(true, edge.T_source_target)
 
@@ -47,25 +59,90 @@ class Mapped:
 @pytest.fixture(scope="module")
 def twice_round(tmp_path_factory):
     """One and a third rounds of a corridor that is longer than a window can hold."""
-    mapped = Mapped(
-        LAPS[: len(LAPS) * 2 // 3], corridor_round(*ROUND), tmp_path_factory.mktemp("twice_round")
-    )
-    yield mapped
-    mapped.mapper.topo.close()
+    building = Building(tmp_path_factory.mktemp("twice_round"))
+    for _ in building.map(LAPS[: len(LAPS) * 2 // 3]):
+        pass
+    yield building
+    building.mapper.close()
 
 
 def test_a_round_driven_again_is_closed_and_every_closure_is_right(twice_round):
-    closures = [edge for edge in twice_round.store.edges() if edge.type is EdgeType.LOOP_CLOSING]
-    assert closures
-    off = np.array([twice_round.off(edge) for edge in closures])
+    off = np.array([twice_round.off(edge) for edge in twice_round.closures()])
+    assert len(off) > 0
     assert np.hypot(off[:, 0], off[:, 1]).max() < 0.25
     assert np.abs(off[:, 2]).max() < 0.05
 
 
 def test_the_second_time_round_the_robot_is_at_the_nodes_of_the_first(twice_round):
     first_lap = set(range(1, max(twice_round.born) // 2))
-    assert twice_round.mapper.topo.associated_id in first_lap
+    assert twice_round.topo.associated_id in first_lap
     assert first_lap & set(twice_round.mapper.view().T_grid_node)
+
+
+@pytest.fixture
+def building(tmp_path):
+    building = Building(tmp_path)
+    yield building
+    building.mapper.close()
+
+
+@pytest.mark.parametrize(("away", "to"), [(260, 150), (330, 150), (400, 0)])
+def test_a_robot_carried_to_where_it_looks_different_says_so_at_once_and_is_found_again(building, away, to):
+    """Whoever uses the library alone has it too: no bumper, no wheel switch and no robot around it."""
+    path = [*LAPS[:away], *LAPS[to : to + 100]]
+    said, lost, known = {}, [], set()
+    for k, (_, mapped) in enumerate(building.map(path, carried_at={away})):
+        view = building.mapper.view()
+        if k == away - 1:
+            known = set(building.born)
+        if mapped.displaced:
+            said[k] = view.quality
+        if view.lost:
+            lost.append(k)
+    assert said == {away: 0.0}
+    assert lost == list(range(away + 1, away + 1 + len(lost)))
+    assert 0 < len(lost) < 60
+    off = [building.off(edge) for edge in building.closures() if edge.target_id in known]
+    assert off
+    assert np.hypot(*np.array(off).T[:2]).max() < 0.15
+    assert len(building.topo.graph.reach(building.topo.associated_id, 1e9)) == building.store.count("node")
+
+
+def test_a_robot_lifted_for_a_moment_goes_on_and_one_lifted_for_long_is_lost(building):
+    scans = list(drive(LAPS[:60], WALLS, seed=2))
+    for _, odometry, scan in scans[:50]:
+        building.mapper.update(scan, odometry)
+    nodes = building.store.count("node")
+    _, odometry, scan = scans[50]
+
+    def later(after_s, **lifted):
+        when = replace(scan, stamp_s=scan.stamp_s + after_s)
+        return building.mapper.update(when, replace(odometry, stamp_s=when.stamp_s), **lifted)
+
+    assert not later(0.1, lifted=True).used
+    assert building.mapper.view().quality == 0.0
+    assert later(0.2).displaced == ""
+    assert building.mapper.view().quality > 0.5
+    later(0.5, lifted=True)
+    later(2.0, lifted=True)
+    put_down = later(2.1)
+    assert put_down.used
+    assert "carried" in put_down.displaced
+    assert building.mapper.view().lost
+    assert building.store.count("node") == nodes + 1
+
+
+def test_a_new_floor_begins_with_an_empty_window_joined_by_the_lift(building):
+    scans = list(drive(LAPS[:60], WALLS, seed=2))
+    for _, odometry, scan in scans[:50]:
+        building.mapper.update(scan, odometry)
+    below = building.topo.associated_id
+    _, odometry, scan = scans[50]
+    building.mapper.update(scan, odometry, events=[LevelChanged(1)])
+    above = building.topo.associated_id
+    assert building.topo.graph.node(above).level == building.topo.level == 1
+    assert building.topo.graph.edge_between(below, above).type is EdgeType.ODOMETRY
+    assert not building.mapper.view().lost
 
 
 class Taught:

@@ -21,7 +21,7 @@ def drive(path, mission, duration_s, seed=4):
     core = build_core(RobotConfig(), path / "map.lemto", durable=False, seed=seed)
     calls = []
     ended = run_lockstep(simulator, core, parse_mission(mission), duration_s, record=calls.append)
-    trail = np.concatenate(list(core.mapping.mapper.trail.records()))
+    trail = np.concatenate(list(core.mapping.mapper.topo.trail.records()))
     truth = simulator.truth()
     core.close()
     simulator.close()

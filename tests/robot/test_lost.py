@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lemtomap.grid import SlamConfig, WindowMatcher
+from lemtomap.pipeline import Mapper
 from lemtomap.se2 import between, compose
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import Bumped, NothingKnownHere
@@ -34,9 +35,9 @@ class Mapping:
 
     def __init__(self, robot, path, born):
         store = (TopoStore.open if path.exists() else TopoStore.create)(path, durable=False)
-        mapper = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
+        topo = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
         self.exchange, self.robot, self.born = Exchange(), robot, born
-        self.step = MappingStep(lambda: WindowMatcher(SlamConfig()), mapper, self.exchange)
+        self.step = MappingStep(Mapper(lambda: WindowMatcher(SlamConfig()), topo), self.exchange)
         self.told = []
 
     def take(self, scans, *, until_found=False):
@@ -90,9 +91,8 @@ def test_a_carried_robot_says_so_and_finds_itself_again(mapped):
     way = Tour(RoutePlanner(world.raster).path((5.4, 3.0), (9.0, 5.0)))
     assert mapping.take(robot.drive(way), until_found=True)
     old = set(mapping.view.T_grid_node) & known
-    assert (
-        max(mapping.off_m(node_id) for node_id in old if mapping.step.mapper.standing(node_id).anchored) < 0.1
-    )
+    anchored = [node_id for node_id in old if mapping.step.mapper.topo.standing(node_id).anchored]
+    assert max(mapping.off_m(node_id) for node_id in anchored) < 0.1
 
     mapping.take(robot.carry(np.array([13.5, 5.2, -1.0])))
     mapping.take(robot.stand(0.3))
@@ -101,8 +101,8 @@ def test_a_carried_robot_says_so_and_finds_itself_again(mapped):
     way = Tour(RoutePlanner(world.raster).path((13.5, 5.2), (10.0, 5.0)))
     assert mapping.take(robot.drive(way), until_found=True)
     assert mapping.off_m(mapping.view.associated_id) < 0.1
-    joined = set(mapping.step.mapper.graph.reach(mapping.view.associated_id, 1e9))
-    assert len(joined) == mapping.step.mapper.store.count("node")
+    joined = set(mapping.step.mapper.topo.graph.reach(mapping.view.associated_id, 1e9))
+    assert len(joined) == mapping.step.mapper.topo.store.count("node")
     mapping.step.close()
     robot.close()
 
@@ -146,7 +146,7 @@ def test_a_part_that_nothing_joins_is_joined_when_the_robot_comes_by(mapped, tmp
     mapping = Mapping(robot, own, dict(born))
     mapping.take(robot.stand(1.0))
     mapping.take(robot.drive(Tour(RoutePlanner(world.raster).path((13.0, 5.0), (3.0, 5.0)))))
-    mapper = mapping.step.mapper
+    mapper = mapping.step.mapper.topo
     assert not mapping.view.lost
     assert set(born) <= set(mapper.graph.reach(mapping.view.associated_id, 1e9))
     assert mapping.off_m(mapping.view.associated_id) < 0.1

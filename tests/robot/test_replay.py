@@ -54,7 +54,7 @@ def test_a_recorded_run_can_be_mapped_again(tmp_path):
     told = record(tmp_path / "run.mcap", 5.0)
     core = build_core(RobotConfig(), tmp_path / "map.lemto", durable=False)
     end_s = replay_map(tmp_path / "run.mcap", core)
-    trail = np.concatenate(list(core.mapping.mapper.trail.records()))
+    trail = np.concatenate(list(core.mapping.mapper.topo.trail.records()))
     core.close()
     assert 4.9 < end_s <= 5.0
     whole = sum(isinstance(event, LaserScan) and event.complete for event in told)

@@ -46,7 +46,7 @@ def test_the_robot_maps_and_drives_in_real_time_and_leaves_nothing_behind(tmp_pa
         runtime = runtime_on(hardware, tmp_path, Recorder(tmp_path / "run.mcap"))
         runtime.run(parse_mission("explore"), 10.0)
         runtime.core.close()
-        runtime.core.mapping.mapper.trail.close()  # readable until then, for the files a run leaves
+        runtime.core.mapping.mapper.topo.trail.close()  # readable until then, for the files a run leaves
         runtime.onlooker.close()
     assert hardware.truth["path_m"] > 0.5
     assert hardware.truth["contacts"] == 0

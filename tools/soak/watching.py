@@ -86,7 +86,7 @@ class Watcher:
 
     def _sample(self, now_s: float) -> None:
         core, mission, truth = self._core, self._mission, self._simulator.truth()
-        store, reached = core.mapping.mapper.store, sum(one.reached for one in mission.errands)
+        store, reached = core.mapping.mapper.topo.store, sum(one.reached for one in mission.errands)
         closures = next(store.query("SELECT count(*) FROM edge WHERE type = ?", (LOOP,)))[0]
         sample = Sample(
             stamp_s=round(now_s, 3),
@@ -123,7 +123,7 @@ class Watcher:
     def closures(self) -> list[Closure]:
         """Return every loop-closing edge that the map holds now, beside the truth."""
         found = []
-        for edge in self._core.mapping.mapper.store.edges():
+        for edge in self._core.mapping.mapper.topo.store.edges():
             if edge.type is EdgeType.LOOP_CLOSING and {edge.source_id, edge.target_id} <= self._born.keys():
                 truth = between(self._born[edge.source_id], self._born[edge.target_id])
                 off = between(truth, edge.T_source_target)

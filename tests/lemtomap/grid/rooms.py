@@ -31,13 +31,16 @@ def scan_at(T_world_base, walls, stamp_s=0.0, beams=240, range_max_m=5.6, noise_
     return Scan(stamp_s, ranges, float(angles[0]), float(angles[1] - angles[0]), range_max_m=range_max_m)
 
 
-def drive(path, walls, seed=0, noise_m=0.01, odometry_noise=0.03, **kinds):
-    """Yield (true pose, Odometry, Scan) along poses; odometry drifts by a share of each step."""
+def drive(path, walls, seed=0, noise_m=0.01, odometry_noise=0.03, carried_at=(), **kinds):
+    """Yield (true pose, Odometry, Scan) along poses; odometry drifts by a share of each step.
+
+    `carried_at`: numbers of poses to which no wheel turned.
+    """
     rng = np.random.default_rng(seed)
     T_odom_base = np.array(path[0], dtype=float)
     before = np.array(path[0], dtype=float)
     for i, here in enumerate(path):
-        step = se2.between(before, here)
+        step = np.zeros(3) if i in carried_at else se2.between(before, here)
         T_odom_base = se2.compose(T_odom_base, step * (1.0 + odometry_noise * rng.standard_normal(3)))
         before = np.array(here, dtype=float)
         yield (

@@ -36,7 +36,7 @@ class Oracle:
         self.graph = graph
 
     def describe(self, points_node):
-        return b""
+        return points_node[:0].tobytes()
 
     def place_taken(self, node_id, place):
         pass

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lemtomap.se2 import Pose, between, transform
-from lemtomap.topo.graph import Covariance
 from lemtomap.types import Odometry, SlamUpdate
 
 RIGHT_M, RIGHT_RAD = 0.10, math.radians(2.0)
@@ -83,7 +82,19 @@ class Watch:
 
     def __init__(self, config: WatchConfig | None = None) -> None:
         self.config = config or WatchConfig()
+        self._lifted_since_s: float | None = None
         self.restart()
+
+    def lift(self, stamp_s: float) -> None:
+        """Take note that the wheels hang in the air: what odometry says is not true."""
+        if self._lifted_since_s is None:
+            self._lifted_since_s = stamp_s
+
+    def put_down(self, stamp_s: float) -> str:
+        """Take note that the wheels stand; return why the robot must have been carried, empty when not."""
+        since_s, self._lifted_since_s = self._lifted_since_s, None
+        carried = since_s is not None and stamp_s - since_s >= self.config.carried_s
+        return "carried elsewhere, or put back: wheels hung in the air" if carried else ""
 
     def restart(self) -> None:
         """Begin anew, in a new window."""
@@ -167,7 +178,7 @@ class Watch:
 
 
 def pose_quality(
-    covariance: Covariance, fit: float, *, born: bool, measured: bool, config: WatchConfig
+    covariance: NDArray[np.float64], fit: float, *, born: bool, measured: bool, config: WatchConfig
 ) -> float:
     """Return how likely a pose is right within 10 cm and 2 degrees, 0 to 1.
 

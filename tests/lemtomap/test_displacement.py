@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from lemtomap.displacement import Watch, WatchConfig, pose_quality
 from lemtomap.se2 import transform
-from lemtomap.topo.whereabouts import Watch, WatchConfig, pose_quality
 from lemtomap.types import Odometry
 from tests.lemtomap.topo.drive import said
 
