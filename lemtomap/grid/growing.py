@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.grid import kernels
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.gmapping import RollingGmapping, Visit
+from lemtomap.grid.kernels import window as kernels
 from lemtomap.grid.matching import Match
 from lemtomap.grid.motion import between, compose
 from lemtomap.grid.scan import Beams

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.grid import kernels
 from lemtomap.grid.config import SlamConfig
-from lemtomap.grid.planes import kernels as planes
+from lemtomap.grid.kernels import planes
+from lemtomap.grid.kernels import window as kernels
 from lemtomap.grid.scan import Beams
 from lemtomap.grid.scan import kernels as scan_kernels
 from lemtomap.se2 import Pose, transform
@@ -21,7 +21,7 @@ LOG_ODDS_PER_EVIDENCE = 0.5  # evidence 12 of 12 shows as 100 %, -5 as 8 %
 
 
 class WindowArrays(NamedTuple):
-    """The cells as kernels take them; lemtomap.grid.kernels says what each array holds."""
+    """The cells as kernels take them; lemtomap.grid.kernels.window says what each array holds."""
 
     evidence: NDArray[np.int8]
     averaged: NDArray[np.uint8]

@@ -11,8 +11,8 @@ from lemtomap.se2 import Pose, inverse, transform
 from lemtomap.topo.align import HitMap, Match, match_place
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Place
+from lemtomap.topo.kernels import fitting
 from lemtomap.topo.local import LocalMap, Standing
-from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.place import decode_place, encode_place
 from lemtomap.types import GridView

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lemtomap.se2 import Pose, between, compose
-from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge
+from lemtomap.topo.kernels import poses as kernels
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.solve import Problem, solve_local
 from lemtomap.types import GridView

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from lemtomap.displacement import pose_quality
 from lemtomap.errors import LemtomapError
 from lemtomap.se2 import Pose, between, compose
-from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.doubt import COVARIANCE_FLOOR, NOWHERE, relative_to_window
 from lemtomap.topo.events import NavEvent, NothingKnownHere
 from lemtomap.topo.graph import USUAL_SPEED_MPS, Covariance, Edge, chain_covariance, reversed_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
+from lemtomap.topo.kernels import poses as kernels
 from lemtomap.topo.learning import learn
 from lemtomap.topo.levels import Lift, put_on_level
 from lemtomap.topo.local import LocalMap, Standing

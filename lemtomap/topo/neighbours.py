@@ -7,9 +7,9 @@ from itertools import islice
 import numpy as np
 
 from lemtomap.se2 import Pose, between
-from lemtomap.topo import kernels
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
+from lemtomap.topo.kernels import sight
 from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.types import EdgeType, GridView
@@ -124,14 +124,14 @@ def directly_navigable(grid: GridView, start: Pose, end: Pose, config: TopoConfi
     x, y = grid.origin_m
     line = (start[0] - x, start[1] - y, end[0] - x, end[1] - y)
     limits = (config.robot_radius_m, config.occupied_from)
-    return bool(kernels.line_is_navigable(grid.occupancy, grid.resolution_m, *line, *limits))
+    return bool(sight.line_is_navigable(grid.occupancy, grid.resolution_m, *line, *limits))
 
 
 def in_sight(grid: GridView, start: Pose, end: Pose, config: TopoConfig) -> bool:
     """Tell whether no wall stands between two places in the window."""
     x, y = grid.origin_m
     line = (start[0] - x, start[1] - y, end[0] - x, end[1] - y)
-    return bool(kernels.line_is_clear(grid.occupancy, grid.resolution_m, *line, config.occupied_from))
+    return bool(sight.line_is_clear(grid.occupancy, grid.resolution_m, *line, config.occupied_from))
 
 
 def independent_share(measured: Covariance, chain: Covariance) -> float:

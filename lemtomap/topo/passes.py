@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lemtomap.se2 import Pose, between, transform
+from lemtomap.topo.cells import averaged, thinned
 from lemtomap.topo.graph import Covariance, sure_of
-from lemtomap.topo.lines import kernels as lines
-from lemtomap.topo.loops.cells import averaged, thinned
-from lemtomap.topo.loops.fitting import kernels as fitting
+from lemtomap.topo.kernels import fitting, lines
 from lemtomap.topo.trail import Look
 
 Points = NDArray[np.float64]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, adjoint, between, compose, inverse
-from lemtomap.topo import kernels
 from lemtomap.topo.graph import Covariance, Edge
+from lemtomap.topo.kernels import poses as kernels
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.passes import Overlay, Passes
 from lemtomap.topo.solve import Problem, solve_whole, straightened

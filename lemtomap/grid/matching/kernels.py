@@ -2,7 +2,7 @@
 no classes.
 
 Point to line, robust, Gauss-Newton with the odometry prior; before it a hill climb where the guess is poor.
-Arrays as in lemtomap.grid.kernels.
+Arrays as in lemtomap.grid.kernels.window.
 """
 
 import math
@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from lemtomap.grid.planes.kernels import is_other_face
-from lemtomap.grid.searching.kernels import climb, sweep
+from lemtomap.grid.kernels.planes import is_other_face
+from lemtomap.grid.kernels.searching import climb, sweep
 
 Array = NDArray[Any]
 Pair = tuple[float, float]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose
-from lemtomap.topo.align.gathering import kernels
+from lemtomap.topo.kernels import gathering
 from lemtomap.types import GridView
 
 CELL_M = 0.05
@@ -41,7 +41,7 @@ class HitMap:
                 return
             self._way_m += step_m
         self._last = np.array(T_grid_base)
-        kernels.add_hits(
+        gathering.add_hits(
             points_base,
             self._last,
             CELL_M,
@@ -67,8 +67,8 @@ class HitMap:
         """
         window = (grid.resolution_m, *grid.origin_m)
         if self._last is None:
-            return kernels.boundary_cells(grid.occupancy, *window, *centre_m, radius_m, occupied_from)
-        return kernels.collect_hits(
+            return gathering.boundary_cells(grid.occupancy, *window, *centre_m, radius_m, occupied_from)
+        return gathering.collect_hits(
             self._owner,
             self._taken,
             self._sums,

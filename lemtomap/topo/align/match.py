@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lemtomap.se2 import Pose, adjoint, between, wrap_angle
 from lemtomap.topo.align import kernels
 from lemtomap.topo.graph import Covariance
-from lemtomap.topo.lines import kernels as lines
+from lemtomap.topo.kernels import lines
 from lemtomap.topo.place import Boundary
 from lemtomap.types import GridView
 

@@ -9,7 +9,7 @@ every component about equally (0.025), so plain distances need no whitening.
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.topo.loops.cells import first_of
+from lemtomap.topo.cells import first_of
 
 WAVE_NUMBERS = (0.6, 0.9, 1.3, 1.9, 2.8)  # rad per m: features of 2 to 10 m, less than a room to a room
 DIRECTIONS = 16  # of the wave vector over half a turn; the other half mirrors it

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lemtomap.topo.kernels import panorama
 from lemtomap.topo.loops.config import LocatorConfig
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.loops.places import PlaceBook, kept
-from lemtomap.topo.panorama import kernels
 
 _STEPS_M = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])  # round a node: the next node is a metre off
 STANDPOINTS_M = np.stack(np.meshgrid(_STEPS_M, _STEPS_M), axis=-1).reshape(-1, 2)
@@ -44,9 +44,9 @@ class LineUp:
         is_known: Callable[[int], bool],
     ) -> None:
         self._config, self._index, self._places, self._is_known = config, index, places, is_known
-        self._panoramas: OrderedDict[int, kernels.Ranges] = OrderedDict()
+        self._panoramas: OrderedDict[int, panorama.Ranges] = OrderedDict()
         self._tried: dict[int, _Trial] = {}
-        self._view = np.full(kernels.BEARINGS, kernels.UNSEEN, dtype=np.uint8)
+        self._view = np.full(panorama.BEARINGS, panorama.UNSEEN, dtype=np.uint8)
         self._at = (0.0, 0.0)
         self._first: tuple[float, float] | None = None
         self._unranked: deque[int] = deque()
@@ -62,14 +62,14 @@ class LineUp:
         return not self._unranked and not self._queue
 
     def begin(
-        self, points_base: kernels.Values, descriptor: bytes, travelled_m: float, turned_rad: float
+        self, points_base: panorama.Values, descriptor: bytes, travelled_m: float, turned_rad: float
     ) -> None:
         """Begin a round with what the robot sees now: float64 (N, 2) points, metres, base frame."""
         config, self._at = self._config, (travelled_m, turned_rad)
         self._first = self._first or self._at
         moved_m, turned = travelled_m - self._first[0], turned_rad - self._first[1]
         self._is_whole = moved_m >= config.all_round_m or turned >= config.all_round_rad
-        self._view = kernels.seen(points_base)
+        self._view = panorama.seen(points_base)
         self._ranked.clear()
         for alike in self._index.nearest(descriptor, config.ranked, leaves=config.leaves):
             if self._is_known(alike.node_id) and self._is_due(alike.node_id):
@@ -84,7 +84,7 @@ class LineUp:
             node_id = self._unranked.popleft()
             spent += self._config.rank_work if node_id in self._panoramas else self._config.panorama_work
             places = kept(self._panoramas, node_id, self._config.ranked, self._look_from)
-            unlike = kernels.unlikeness(self._view, places)
+            unlike = panorama.unlikeness(self._view, places)
             again = self._config.again_unlike * self._tried.get(node_id, NEVER).times
             self._ranked.append((unlike + again, node_id))
         if not self._unranked:
@@ -113,9 +113,9 @@ class LineUp:
         moved_m, turned_rad = self._at[0] - trial.travelled_m, self._at[1] - trial.turned_rad
         return moved_m >= config.again_m or turned_rad >= config.again_rad
 
-    def _look_from(self, node_id: int) -> kernels.Ranges:
+    def _look_from(self, node_id: int) -> panorama.Ranges:
         points = self._places.points(node_id)
-        return kernels.stored(np.empty((0, 2)) if points is None else points, STANDPOINTS_M)
+        return panorama.stored(np.empty((0, 2)) if points is None else points, STANDPOINTS_M)
 
     def _choose(self) -> None:
         """Line up the places most alike, none beside another."""

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between, compose, inverse, transform
+from lemtomap.topo.kernels import fitting
 from lemtomap.topo.loops.config import LocatorConfig, LoopConfig
 from lemtomap.topo.loops.descriptor import describe
-from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.loops.lineup import LineUp
 from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, inverse, pose, transform, wrap_angle
 from lemtomap.topo.graph import sure_of
-from lemtomap.topo.lines import kernels as lines
+from lemtomap.topo.kernels import fitting, lines
 from lemtomap.topo.loops import kernels
 from lemtomap.topo.loops.config import MatchConfig
-from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.types import GridView
 
 Points = NDArray[np.float64]

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lemtomap.se2 import Pose, inverse
+from lemtomap.topo.kernels import fitting
 from lemtomap.topo.loops.config import MatchConfig
-from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.loops.matcher import Points, Reference
 from lemtomap.topo.loops.places import RASTER_M, Company
 from lemtomap.types import GridView

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, transform
-from lemtomap.topo.loops.cells import thinned
+from lemtomap.topo.cells import thinned
 from lemtomap.topo.loops.descriptor import BYTES, unpack
 from lemtomap.topo.paging import PagedGraph, chain
 from lemtomap.topo.place import decode_place

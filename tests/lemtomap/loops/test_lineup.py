@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import inverse, pose, transform
+from lemtomap.topo.kernels import fitting, panorama
 from lemtomap.topo.loops.config import LocatorConfig
 from lemtomap.topo.loops.descriptor import describe
-from lemtomap.topo.loops.fitting import kernels as fitting
 from lemtomap.topo.loops.lineup import LineUp
-from lemtomap.topo.panorama import kernels
 
 ROOMS = 60
 
@@ -97,12 +96,12 @@ def test_a_place_searched_in_vain_is_not_tried_again_from_the_same_spot(line_up)
 
 
 def test_panoramas_are_alike_at_any_turn_and_unlike_when_nothing_was_seen():
-    ranges = kernels.seen(walls(3))
+    ranges = panorama.seen(walls(3))
     for turn in (0, 5, 40):
-        assert kernels.unlikeness(np.roll(ranges, turn), ranges[None]) == 0.0
-    assert kernels.unlikeness(np.roll(ranges, 3), kernels.seen(walls(4))[None]) > 0.1
-    blind = np.full(kernels.BEARINGS, kernels.UNSEEN, dtype=np.uint8)
-    assert kernels.unlikeness(blind, ranges[None]) == 1.0
+        assert panorama.unlikeness(np.roll(ranges, turn), ranges[None]) == 0.0
+    assert panorama.unlikeness(np.roll(ranges, 3), panorama.seen(walls(4))[None]) > 0.1
+    blind = np.full(panorama.BEARINGS, panorama.UNSEEN, dtype=np.uint8)
+    assert panorama.unlikeness(blind, ranges[None]) == 1.0
 
 
 def test_only_what_one_picture_explains_alone_tells_two_apart():

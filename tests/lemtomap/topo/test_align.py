@@ -3,7 +3,7 @@ import pytest
 
 from lemtomap.se2 import between, compose, inverse, pose, transform
 from lemtomap.topo.align import HitMap, MatchConfig, match_place
-from lemtomap.topo.align.gathering import kernels as gathering
+from lemtomap.topo.kernels import gathering
 from lemtomap.topo.place import decode_place, encode_place
 from lemtomap.types import GridView
 from tests.lemtomap.topo.test_place import office

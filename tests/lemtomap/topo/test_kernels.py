@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import between, compose
-from lemtomap.topo import kernels
 from lemtomap.topo.graph import Edge, chain_covariance
+from lemtomap.topo.kernels import poses, sight
 from lemtomap.types import EdgeType
 from tests.lemtomap.topo.drive import room
 
@@ -20,7 +20,7 @@ def test_carrying_a_pose_along_an_edge_is_the_same_as_by_the_slow_way(backwards)
         pose, r, first = rng.normal(0, 2, 3), rng.normal(0, 2, 3), spd(rng)
         edge = Edge(1, 10, 11, r, spd(rng), EdgeType.ODOMETRY)
         start = 11 if backwards else 10
-        T, covariance = kernels.carried(pose, first, r, edge.covariance, backwards)
+        T, covariance = poses.carried(pose, first, r, edge.covariance, backwards)
         step = edge.seen_from(start)
         np.testing.assert_allclose(between(T, compose(pose, step)), 0.0, atol=1e-12)
         np.testing.assert_allclose(
@@ -36,11 +36,11 @@ def test_drift_grows_by_a_step_as_by_the_slow_way():
     c, s = np.cos(step[2]), np.sin(step[2])
     turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
     np.testing.assert_allclose(
-        kernels.drifted(drift, before, after, step_covariance),
+        poses.drifted(drift, before, after, step_covariance),
         chain_covariance(drift, step, turn @ step_covariance @ turn.T),
         rtol=1e-9,
     )
-    np.testing.assert_allclose(between(kernels.pose_between(before, after), step), 0.0, atol=1e-12)
+    np.testing.assert_allclose(between(poses.pose_between(before, after), step), 0.0, atol=1e-12)
 
 
 def test_a_line_is_navigable_exactly_where_the_inflated_window_is_free_and_known():
@@ -58,11 +58,11 @@ def test_a_line_is_navigable_exactly_where_the_inflated_window_is_free_and_known
         share = np.arange(steps + 1) / steps
         c = np.floor((x0 + (x1 - x0) * share) / 0.05).astype(int)
         r = np.floor((y0 + (y1 - y0) * share) / 0.05).astype(int)
-        assert kernels.line_is_navigable(occupancy, 0.05, x0, y0, x1, y1, 0.18, 50) == open_cells[r, c].all()
-        assert kernels.line_is_clear(occupancy, 0.05, x0, y0, x1, y1, 50) == (occupancy[r, c] < 50).all()
+        assert sight.line_is_navigable(occupancy, 0.05, x0, y0, x1, y1, 0.18, 50) == open_cells[r, c].all()
+        assert sight.line_is_clear(occupancy, 0.05, x0, y0, x1, y1, 50) == (occupancy[r, c] < 50).all()
 
 
 def test_outside_the_window_nothing_is_navigable_but_sight_is_not_blocked():
     grid = room(4.0)
-    assert not kernels.line_is_navigable(grid.occupancy, 0.05, 1.0, 1.0, 5.0, 1.0, 0.18, 50)
-    assert kernels.line_is_clear(grid.occupancy, 0.05, 1.0, 1.0, 5.0, 1.0, 50)
+    assert not sight.line_is_navigable(grid.occupancy, 0.05, 1.0, 1.0, 5.0, 1.0, 0.18, 50)
+    assert sight.line_is_clear(grid.occupancy, 0.05, 1.0, 1.0, 5.0, 1.0, 50)

@@ -1,8 +1,8 @@
 """Kernels of the planes: averaged hits around a cell in, that cell's surface normal out. Plain arrays, no
 classes.
 
-Arrays as in lemtomap.grid.kernels. A thin wall has two faces within reach of one fit, and together they are
-no plane; so only hits seen from the same side of the surface count.
+Arrays as in lemtomap.grid.kernels.window. A thin wall has two faces within reach of one fit, and together
+they are no plane; so only hits seen from the same side of the surface count.
 """
 
 import math

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.topo.loops.fitting import kernels
+from lemtomap.topo.kernels import cells as kernels
 
 Points = NDArray[np.float64]
 """float64 (N, 2), metres."""

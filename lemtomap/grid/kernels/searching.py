@@ -1,7 +1,7 @@
 """Kernels of the search before a match: how close hits come to occupied cells, and poses where they come
 closer. Plain arrays, no classes.
 
-Arrays as in lemtomap.grid.kernels.
+Arrays as in lemtomap.grid.kernels.window.
 """
 
 import math

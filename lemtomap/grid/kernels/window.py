@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from lemtomap.grid.planes.kernels import FAR, renew_normal
+from lemtomap.grid.kernels.planes import FAR, renew_normal
 
 Array = NDArray[Any]
 

@@ -1,0 +1,1 @@
+"""Flat loops over the arrays of a window, one noun a file."""

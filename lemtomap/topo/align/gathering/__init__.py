@@ -1,1 +1,0 @@
-"""Laser hits gathered in a ring of cells around the robot."""

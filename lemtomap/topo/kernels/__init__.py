@@ -1,0 +1,1 @@
+"""Flat loops of the topological map over plain arrays, one noun a file."""

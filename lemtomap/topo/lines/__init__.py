@@ -1,1 +1,0 @@
-"""Which way the surfaces run on which points lie."""

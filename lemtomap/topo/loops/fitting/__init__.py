@@ -1,1 +1,0 @@
-"""Fine alignment of one set of hits with another."""

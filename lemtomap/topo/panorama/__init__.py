@@ -1,1 +1,0 @@
-"""What stands round a point, bearing by bearing, and how alike two such views are."""
