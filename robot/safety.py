@@ -12,6 +12,8 @@ restrictive wins, and the reason names the rule that took something away:
     settling          0.5 s after each of the three above           stop
     adapter           the charging cable is plugged in              stop
     battery empty     dangerously low for 5 s                       stop
+    mapping hangs     a scan waits for the map for 0.25 s           stop
+    navigation hangs  no cycle was begun for 0.25 s                 stop
     velocity silent   no fresh velocity for 0.3 s                   stop
     scan silent       no scan for 0.5 s and motion wanted           stop
     scan blind        (almost) no beam of the scan is valid         stop
@@ -49,6 +51,8 @@ class Reason(StrEnum):
     SETTLING = "settling"
     ADAPTER = "charging cable plugged in"
     BATTERY_EMPTY = "battery empty"
+    MAPPING_HANGS = "mapping hangs"
+    NAVIGATION_HANGS = "navigation hangs"
     VELOCITY_SILENT = "velocity silent"
     SCAN_SILENT = "scan silent"
     SCAN_BLIND = "scan blind"
@@ -70,6 +74,8 @@ class SafetyLimits:
     velocity_age_s: float = 0.3
     base_age_s: float = 0.2
     scan_age_s: float = 0.5
+    map_age_s: float = 0.25  # two scan periods and a half: mapping takes tens of ms; stops within 0.3 s
+    cycle_age_s: float = 0.25  # the same of navigation's 0.1 s
     settle_s: float = 0.5
     battery_empty_v: float = 13.2  # the official driver's "dangerous"
     battery_hold_s: float = 5.0  # the voltage sags while the motors start
@@ -106,6 +112,10 @@ class Evidence:
 
     velocity_stamp_s: float = -math.inf
     base_stamp_s: float = -math.inf
+    map_stamp_s: float = -math.inf
+    """All scans until then are in the map, or known to be of no use to it."""
+    cycle_stamp_s: float = -math.inf
+    """When navigation began its latest cycle."""
     scan_stamp_s: float = -math.inf
     bumper: Sides = field(default_factory=Sides)
     cliff: Sides = field(default_factory=Sides)
@@ -147,7 +157,11 @@ class SafetyGate:
 
     def check(self, v_mps: float, w_radps: float, evidence: Evidence, now_s: float) -> Allowed:
         """Return what may be sent now. Holds: never faster than wanted, never another direction."""
-        stop = self._fault(evidence, now_s) or self._silence(v_mps, w_radps, evidence, now_s)
+        stop = (
+            self._fault(evidence, now_s)
+            or self._hung(evidence, now_s)
+            or self._silence(v_mps, w_radps, evidence, now_s)
+        )
         if not (math.isfinite(v_mps) and math.isfinite(w_radps)):
             stop = Reason.BAD_COMMAND
         if stop is not None:
@@ -183,6 +197,14 @@ class SafetyGate:
         since_s = self._battery_low_since_s
         if since_s is not None and now_s - since_s >= self.limits.battery_hold_s:
             return Reason.BATTERY_EMPTY
+        return None
+
+    def _hung(self, evidence: Evidence, now_s: float) -> Reason | None:
+        """Judge the robot's own threads, also while it stands: else it would stand for ever, unexplained."""
+        if not _fresh(evidence.map_stamp_s, now_s, self.limits.map_age_s):
+            return Reason.MAPPING_HANGS
+        if not _fresh(evidence.cycle_stamp_s, now_s, self.limits.cycle_age_s):
+            return Reason.NAVIGATION_HANGS
         return None
 
     def _silence(self, v_mps: float, w_radps: float, evidence: Evidence, now_s: float) -> Reason | None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TESTS = ("tests/robot/test_safety.py", "tests/robot/test_velocity.py")
+TESTS = ("tests/robot/test_safety.py", "tests/robot/test_velocity.py", "tests/robot/test_watchdog.py")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ def _m(name: str, old: str, new: str, path: str = "robot/safety.py") -> Mutant:
     return Mutant(name, old, new, path)
 
 
-VELOCITY, PROXIMITY = "robot/velocity.py", "robot/proximity.py"
+VELOCITY, PROXIMITY, WATCHDOG = "robot/velocity.py", "robot/proximity.py", "robot/watchdog.py"
 MUTANTS = (
     _m(
         "permission starts true",
@@ -54,12 +54,9 @@ MUTANTS = (
         "if not (math.isfinite(v_mps) and math.isfinite(w_radps)):",
         "if not math.isfinite(v_mps):",
     ),
-    _m("faults ignored", "self._fault(evidence, now_s) or self._silence(", "self._silence("),
-    _m(
-        "silence ignored",
-        "self._fault(evidence, now_s) or self._silence(v_mps, w_radps, evidence, now_s)",
-        "self._fault(evidence, now_s)",
-    ),
+    _m("faults ignored", "self._fault(evidence, now_s)\n            or self._hung", "self._hung"),
+    _m("hung parts ignored", "            or self._hung(evidence, now_s)\n", ""),
+    _m("silence ignored", "            or self._silence(v_mps, w_radps, evidence, now_s)\n", ""),
     _m("stop is not a stop", "return Allowed(0.0, 0.0, stop)", "return Allowed(v_mps, w_radps, stop)"),
     _m("turn survives a stop", "return Allowed(0.0, 0.0, stop)", "return Allowed(0.0, w_radps, stop)"),
     _m("base silence ignored", "if not _fresh(evidence.base_stamp_s, now_s, lim.base_age_s):", "if False:"),
@@ -110,6 +107,25 @@ MUTANTS = (
     ),
     _m("velocity age longer", "velocity_age_s: float = 0.3", "velocity_age_s: float = 0.35"),
     _m("velocity age shorter", "velocity_age_s: float = 0.3", "velocity_age_s: float = 0.29"),
+    _m("hung map passes", "if not _fresh(evidence.map_stamp_s, now_s, self.limits.map_age_s):", "if False:"),
+    _m("map age longer", "map_age_s: float = 0.25", "map_age_s: float = 0.3"),
+    _m("map age shorter", "map_age_s: float = 0.25", "map_age_s: float = 0.24"),
+    _m(
+        "hung navigation passes",
+        "if not _fresh(evidence.cycle_stamp_s, now_s, self.limits.cycle_age_s):",
+        "if False:",
+    ),
+    _m("cycle age longer", "cycle_age_s: float = 0.25", "cycle_age_s: float = 0.3"),
+    _m("cycle age shorter", "cycle_age_s: float = 0.25", "cycle_age_s: float = 0.24"),
+    _m("newest scan counts", "return self._owed[0][1]", "return self._owed[-1][1]", WATCHDOG),
+    _m("scans pile up", "if len(self._owed) < OWED_KEPT:", "if True:", WATCHDOG),
+    _m(
+        "a scan is owed for ever",
+        "self._owed[0][0] <= done_s",
+        "self._owed[0][0] < done_s",
+        WATCHDOG,
+    ),
+    _m("first cycle never comes", "self._began_s if begun_s", "now_s if begun_s", WATCHDOG),
     _m("turning needs no scan", "if v_mps == 0.0 and w_radps == 0.0:", "if v_mps == 0.0:"),
     _m("driving needs no scan", "if v_mps == 0.0 and w_radps == 0.0:", "if w_radps == 0.0:"),
     _m("standing needs a scan", "if v_mps == 0.0 and w_radps == 0.0:", "if False:"),

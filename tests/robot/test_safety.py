@@ -16,8 +16,15 @@ SIDES = [Sides(left=True), Sides(centre=True), Sides(right=True)]
 
 def evidence(**changes):
     """Everything fresh and well, nothing near."""
-    good = Evidence(velocity_stamp_s=NOW, base_stamp_s=NOW, scan_stamp_s=NOW, valid_beams=600)
-    return replace(good, **changes)
+    return replace(fresh(NOW), **changes)
+
+
+def fresh(now_s):
+    """All that has a stamp came just now."""
+    stamps = dict.fromkeys(
+        ("velocity_stamp_s", "base_stamp_s", "map_stamp_s", "cycle_stamp_s", "scan_stamp_s"), now_s
+    )
+    return Evidence(**stamps, valid_beams=600)
 
 
 def gate():
@@ -40,6 +47,15 @@ STOPS = [
     ("wheel drop", (0.0, 0.0), {"wheel_drop": True}, Reason.WHEEL_DROP),
     ("over-current", (0.0, 0.0), {"over_current": True}, Reason.OVER_CURRENT),
     ("charging cable", (-0.1, 0.0), {"adapter": True}, Reason.ADAPTER),
+    ("map just too old", (0.3, 0.0), {"map_stamp_s": NOW - 0.2501}, Reason.MAPPING_HANGS),
+    ("map too old while standing", (0.0, 0.0), {"map_stamp_s": NOW - 0.2501}, Reason.MAPPING_HANGS),
+    ("cycle just too old", (0.3, 0.0), {"cycle_stamp_s": NOW - 0.2501}, Reason.NAVIGATION_HANGS),
+    (
+        "navigation hangs, so nobody wants anything",
+        (0.0, 0.0),
+        {"cycle_stamp_s": NOW - 0.2501, "velocity_stamp_s": -math.inf},
+        Reason.NAVIGATION_HANGS,
+    ),
     ("velocity just too old", (0.3, 0.0), {"velocity_stamp_s": NOW - 0.3001}, Reason.VELOCITY_SILENT),
     ("velocity never given", (0.0, 0.0), {"velocity_stamp_s": -math.inf}, Reason.VELOCITY_SILENT),
     ("scan just too old", (0.3, 0.0), {"scan_stamp_s": NOW - 0.5001}, Reason.SCAN_SILENT),
@@ -52,6 +68,8 @@ PASSES = [
     ("base at its limit", (0.3, 0.0), {"base_stamp_s": NOW - 0.2 + 1e-9}),
     ("stamps a little early", (0.3, 0.0), {"base_stamp_s": NOW + 0.049, "scan_stamp_s": NOW + 0.049}),
     ("velocity at its limit", (0.3, 0.0), {"velocity_stamp_s": NOW - 0.3 + 1e-9}),
+    ("map at its limit", (0.3, 0.0), {"map_stamp_s": NOW - 0.25 + 1e-9}),
+    ("cycle at its limit", (0.3, 0.0), {"cycle_stamp_s": NOW - 0.25 + 1e-9}),
     ("scan at its limit", (0.3, 0.0), {"scan_stamp_s": NOW - 0.5 + 1e-9}),
     ("standing needs no scan", (0.0, 0.0), {"scan_stamp_s": -math.inf, "valid_beams": 0}),
     ("just enough beams", (0.3, 0.0), {"valid_beams": 10}),
@@ -120,7 +138,7 @@ def test_permission_starts_false_and_can_be_taken_back():
 def test_settles_after_a_serious_fault(fault):
     made = gate()
     made.check(0.3, 0.0, evidence(**fault), NOW)
-    later = evidence(base_stamp_s=NOW + 0.49, velocity_stamp_s=NOW + 0.49, scan_stamp_s=NOW + 0.49)
+    later = fresh(NOW + 0.49)
     assert made.check(0.3, 0.0, later, NOW + 0.499) == Allowed(0.0, 0.0, Reason.SETTLING)
     assert made.check(0.3, 0.0, later, NOW + 0.5) == Allowed(0.3, 0.0, Reason.CLEAR)
 
@@ -145,7 +163,7 @@ def test_battery_stops_only_after_its_hold_and_forgives_a_sag():
         (20.0, 13.2, Reason.CLEAR),
     ]:
         now = NOW + since_s
-        ev = evidence(battery_v=volt, base_stamp_s=now, velocity_stamp_s=now, scan_stamp_s=now)
+        ev = replace(fresh(now), battery_v=volt)
         assert made.check(0.3, 0.0, ev, now).reason is reason, since_s
 
 
