@@ -32,7 +32,8 @@ def _m(name: str, old: str, new: str, path: str = "robot/safety.py") -> Mutant:
     return Mutant(name, old, new, path)
 
 
-VELOCITY, PROXIMITY, WATCHDOG = "robot/velocity.py", "robot/proximity.py", "robot/watchdog.py"
+VELOCITY, PROXIMITY = "robot/velocity.py", "robot/proximity.py"
+WATCHDOG, SETTINGS = "robot/watchdog.py", "lemtomap/settings.py"
 MUTANTS = (
     _m(
         "permission starts true",
@@ -61,12 +62,12 @@ MUTANTS = (
     _m("turn survives a stop", "return Allowed(0.0, 0.0, stop)", "return Allowed(0.0, w_radps, stop)"),
     _m("base silence ignored", "if not _fresh(evidence.base_stamp_s, now_s, lim.base_age_s):", "if False:"),
     _m("base age flipped", "if not _fresh(evidence.base_stamp_s", "if _fresh(evidence.base_stamp_s"),
-    _m("base age longer", "base_age_s: float = 0.2", "base_age_s: float = 0.25"),
-    _m("base age shorter", "base_age_s: float = 0.2", "base_age_s: float = 0.19"),
+    _m("base age longer", "base_age_s: float = within(0.2,", "base_age_s: float = within(0.25,"),
+    _m("base age shorter", "base_age_s: float = within(0.2,", "base_age_s: float = within(0.19,"),
     _m("wheel drop ignored", "elif evidence.wheel_drop:", "elif False:"),
     _m("over-current ignored", "elif evidence.over_current:", "elif False:"),
     _m("no settling", "self._settle_until_s = now_s + lim.settle_s", "pass"),
-    _m("settling too short", "settle_s: float = 0.5", "settle_s: float = 0.49"),
+    _m("settling too short", "settle_s: float = within(0.5,", "settle_s: float = within(0.49,"),
     _m("settling at its edge", "elif now_s < self._settle_until_s:", "elif now_s <= self._settle_until_s:"),
     _m("settling flipped", "elif now_s < self._settle_until_s:", "elif now_s > self._settle_until_s:"),
     _m("power ignored", "return serious or self._power(evidence, now_s)", "return serious"),
@@ -105,18 +106,18 @@ MUTANTS = (
         "if not _fresh(evidence.velocity_stamp_s, now_s, lim.velocity_age_s):",
         "if False:",
     ),
-    _m("velocity age longer", "velocity_age_s: float = 0.3", "velocity_age_s: float = 0.35"),
-    _m("velocity age shorter", "velocity_age_s: float = 0.3", "velocity_age_s: float = 0.29"),
+    _m("velocity age longer", "velocity_age_s: float = within(0.3,", "velocity_age_s: float = within(0.35,"),
+    _m("velocity age shorter", "velocity_age_s: float = within(0.3,", "velocity_age_s: float = within(0.29,"),
     _m("hung map passes", "if not _fresh(evidence.map_stamp_s, now_s, self.limits.map_age_s):", "if False:"),
-    _m("map age longer", "map_age_s: float = 0.25", "map_age_s: float = 0.3"),
-    _m("map age shorter", "map_age_s: float = 0.25", "map_age_s: float = 0.24"),
+    _m("map age longer", "map_age_s: float = within(0.25,", "map_age_s: float = within(0.3,"),
+    _m("map age shorter", "map_age_s: float = within(0.25,", "map_age_s: float = within(0.24,"),
     _m(
         "hung navigation passes",
         "if not _fresh(evidence.cycle_stamp_s, now_s, self.limits.cycle_age_s):",
         "if False:",
     ),
-    _m("cycle age longer", "cycle_age_s: float = 0.25", "cycle_age_s: float = 0.3"),
-    _m("cycle age shorter", "cycle_age_s: float = 0.25", "cycle_age_s: float = 0.24"),
+    _m("cycle age longer", "cycle_age_s: float = within(0.25,", "cycle_age_s: float = within(0.3,"),
+    _m("cycle age shorter", "cycle_age_s: float = within(0.25,", "cycle_age_s: float = within(0.24,"),
     _m("newest scan counts", "return self._owed[0][1]", "return self._owed[-1][1]", WATCHDOG),
     _m("scans pile up", "if len(self._owed) < OWED_KEPT:", "if True:", WATCHDOG),
     _m(
@@ -130,8 +131,8 @@ MUTANTS = (
     _m("driving needs no scan", "if v_mps == 0.0 and w_radps == 0.0:", "if w_radps == 0.0:"),
     _m("standing needs a scan", "if v_mps == 0.0 and w_radps == 0.0:", "if False:"),
     _m("scan silence ignored", "if not _fresh(evidence.scan_stamp_s, now_s, lim.scan_age_s):", "if False:"),
-    _m("scan age longer", "scan_age_s: float = 0.5", "scan_age_s: float = 0.6"),
-    _m("scan age shorter", "scan_age_s: float = 0.5", "scan_age_s: float = 0.49"),
+    _m("scan age longer", "scan_age_s: float = within(0.5,", "scan_age_s: float = within(0.6,"),
+    _m("scan age shorter", "scan_age_s: float = within(0.5,", "scan_age_s: float = within(0.49,"),
     _m("blind laser passes", "if evidence.valid_beams < lim.scan_valid_beams:", "if False:"),
     _m(
         "blind limit moved",
@@ -225,6 +226,16 @@ MUTANTS = (
         "w = min(max(allowed.w_radps, -lim.bumped_w_max_radps), lim.bumped_w_max_radps)",
         "w = min(allowed.w_radps, lim.bumped_w_max_radps)",
     ),
+    _m("gate's bounds forgotten", "        check_ranges(self)\n", "        pass\n"),
+    _m("smoother's bounds forgotten", "        check_ranges(self)\n", "        pass\n", VELOCITY),
+    _m("everything is an own part", "within(0.15, 0.0, 0.17,", "within(0.15, 0.0, 10.0,"),
+    _m(
+        "a bound is excluded",
+        "return self.low <= value <= self.high",
+        "return self.low <= value < self.high",
+        SETTINGS,
+    ),
+    _m("no lower bound", "return self.low <= value <= self.high", "return value <= self.high", SETTINGS),
     _m("own posts block", "> lim.own_parts_m]", "> 0.0]"),
     _m("near points ignored", "> lim.own_parts_m]", "> 0.2]"),
     _m("no side margin", "radius_m = lim.body_radius_m + lim.side_margin_m", "radius_m = lim.body_radius_m"),

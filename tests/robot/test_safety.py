@@ -1,13 +1,17 @@
 """One table of cases: what happens in each situation, at each side of each limit."""
 
+import dataclasses
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from lemtomap.errors import BadSetting
+from lemtomap.settings import range_of
 from robot.proximity import free_travel_m
 from robot.safety import Allowed, Evidence, Reason, SafetyGate, SafetyLimits, Sides
+from robot.velocity import SmootherConfig
 
 NOW = 100.0
 LIM = SafetyLimits()
@@ -249,3 +253,45 @@ def test_free_travel_without_points_or_motion_is_endless():
 def test_flags_of_two_moments_join():
     assert (Sides(left=True) | Sides(right=True)) == Sides(left=True, right=True)
     assert (Sides() | Sides(centre=True)) == Sides(centre=True)
+
+
+SAFE = {
+    "v_max_mps": (0.05, 0.65),
+    "reverse_max_mps": (0.02, 0.2),
+    "w_max_radps": (0.1, 1.92),
+    "back_off_mps": (0.02, 0.15),
+    "bumped_w_max_radps": (0.05, 1.0),
+    "velocity_age_s": (0.1, 0.5),
+    "base_age_s": (0.04, 0.5),
+    "scan_age_s": (0.15, 0.8),
+    "map_age_s": (0.15, 0.5),
+    "cycle_age_s": (0.15, 0.5),
+    "settle_s": (0.2, 10.0),
+    "battery_empty_v": (13.0, 15.0),
+    "battery_hold_s": (0.5, 30.0),
+    "scan_valid_beams": (5, 300),
+    "body_radius_m": (0.178, 0.5),
+    "side_margin_m": (0.005, 0.2),
+    "stop_gap_m": (0.01, 0.5),
+    "creep_share": (0.01, 0.2),
+    "brake_mps2": (0.1, 1.2),
+    "reaction_s": (0.1, 1.0),
+    "own_parts_m": (0.0, 0.17),
+}
+
+
+def test_what_the_gate_can_be_told_is_bounded_with_a_reason():
+    ranges = {field.name: range_of(field) for field in dataclasses.fields(SafetyLimits)}
+    assert {name: (each.low, each.high) for name, each in ranges.items()} == SAFE
+    assert all(each.why for each in ranges.values())
+
+
+@pytest.mark.parametrize("cls", [SafetyLimits, SmootherConfig])
+def test_the_bounds_of_safety_hold_for_programs_too(cls):
+    for field in dataclasses.fields(cls):
+        allowed = range_of(field)
+        step = 1 if isinstance(field.default, int) else 1e-9
+        for edge, beyond in ((allowed.low, allowed.low - step), (allowed.high, allowed.high + step)):
+            assert getattr(cls(**{field.name: edge}), field.name) == edge
+            with pytest.raises(BadSetting, match=f"{field.name} = .*must lie between"):
+                cls(**{field.name: beyond})
