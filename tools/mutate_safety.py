@@ -235,7 +235,7 @@ MUTANTS = (
         "return self.low <= value < self.high",
         SETTINGS,
     ),
-    _m("no lower bound", "return self.low <= value <= self.high", "return value <= self.high", SETTINGS),
+    _m("no lower bound", "return self.low <= value", "return value", SETTINGS),
     _m("own posts block", "> lim.own_parts_m]", "> 0.0]"),
     _m("near points ignored", "> lim.own_parts_m]", "> 0.2]"),
     _m("no side margin", "radius_m = lim.body_radius_m + lim.side_margin_m", "radius_m = lim.body_radius_m"),
