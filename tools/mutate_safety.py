@@ -14,6 +14,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from robot.child import python
+
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ("tests/robot/test_safety.py", "tests/robot/test_velocity.py", "tests/robot/test_watchdog.py")
 
@@ -338,7 +340,7 @@ def survives(mutant: Mutant, folder: Path) -> bool:
         )
     target.write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
     try:
-        command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *TESTS]
+        command = python("-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *TESTS)
         environment = dict(os.environ, PYTHONPATH=str(folder), PYTHONDONTWRITEBYTECODE="1")
         run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False)  # noqa: S603 -- our own tests
     finally:
