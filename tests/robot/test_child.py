@@ -1,7 +1,6 @@
 """What lies in the working directory is data: no process of ours runs it."""
 
 import ast
-import importlib.util
 import subprocess
 from pathlib import Path
 
@@ -49,8 +48,8 @@ def test_a_bench_is_not_taken_from_the_working_directory(trap, capfd):
 
 
 @pytest.mark.realtime
-@pytest.mark.skipif(importlib.util.find_spec("pybullet") is None, reason="the simulator needs pybullet")
 def test_the_simulator_is_not_taken_from_the_working_directory(trap):
+    pytest.importorskip("pybullet")
     with FakeHardware("office") as hardware:
         assert hardware.kobuki
     assert not trap.exists()
