@@ -8,7 +8,7 @@ from lemtomap.settings import within
 
 @dataclass(frozen=True, slots=True)
 class SlamConfig:
-    """One parameter set for every robot and log; raises BadSetting when it cannot work.
+    """One parameter set for every robot and log. Raises BadSetting.
 
     Values without another source were measured over the Intel, ACES, Killian and URG-04LX logs together.
     """
