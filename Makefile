@@ -1,8 +1,8 @@
-# Each target sets up what it needs: a fresh machine with Python >= 3.11 is enough.
+# Each target sets up what it needs: a fresh machine with Python >= 3.11 is enough; the simulator needs 3.11.
 VENV := .venv
 STAMP := $(VENV)/.installed
 FITS := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
-PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
+PYTHON ?= $(shell for p in python3.11 python3 python3.13 python3.12; do \
 	$$p -c "$(FITS)" 2>/dev/null && echo $$p && break; done)
 
 .PHONY: demo test check clean

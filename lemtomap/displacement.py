@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lemtomap.se2 import Pose, between, transform
+from lemtomap.settings import within
 from lemtomap.types import Odometry, SlamUpdate
 
 RIGHT_M, RIGHT_RAD = 0.10, math.radians(2.0)
@@ -28,29 +29,38 @@ class WatchConfig:
     more than 0.02 m and 0.02 rad, and a scan fits at least 0.8 times as well as usual.
     """
 
-    jump_m: float = 0.25  # the laser says that far beyond what the wheels say: pushed or carried
-    jump_rad: float = 0.25
-    twitch_m: float = 0.08  # ... so far, and it must fit as well as usual afterwards
-    twitch_rad: float = 0.10
-    fits_again: float = 0.9  # of the usual quality
-    misfit: float = 0.6  # of the usual quality: the scan does not belong here, ...
-    misfit_s: float = 1.0  # ... when it lasts; people pass by
-    known_share: float = 0.25  # of the hits on known ground at least: new ground and open space tell nothing
-    again_m: float = 0.1  # a hit this near to one of an earlier scan shows the same thing
-    again: float = 0.35  # share of such hits below which nothing is left of it (robots left alone: 0.98)
-    again_points: int = 60  # six metres of wall: fewer hits tell nothing
-    before_s: float = 0.35  # age of the scan before, at most ...
-    matched_s: float = 1.5  # ... and of the last one matched: since then the wheels err by centimetres
-    memory: float = 0.05  # share of the newest scan in the usual quality
-    carried_s: float = 1.0  # wheels in the air for so long: carried; shorter ones are door sills
+    jump_m: float = within(0.25, 0.05, 5.0)
+    """The laser says that far beyond what the wheels say: pushed or carried."""
+    jump_rad: float = within(0.25, 0.05, 3.15)
+    twitch_m: float = within(0.08, 0.02, 5.0)  # ... so far, and it must fit as well as usual afterwards
+    twitch_rad: float = within(0.10, 0.02, 3.15)
+    fits_again: float = within(0.9, 0.1, 1.0)  # of the usual quality
+    misfit: float = within(0.6, 0.0, 1.0)  # of the usual quality: the scan does not belong here, ...
+    misfit_s: float = within(1.0, 0.1, 60.0)  # ... when it lasts; people pass by
+    known_share: float = within(0.25, 0.0, 1.0)
+    """Of the hits on known ground at least: new ground and open space tell nothing."""
+    again_m: float = within(0.1, 0.02, 1.0)
+    """A hit this near to one of an earlier scan shows the same thing."""
+    again: float = within(0.35, 0.0, 1.0)
+    """Share of such hits below which nothing is left of it (robots left alone: 0.98)."""
+    again_points: int = within(60, 5, 1000)  # six metres of wall: fewer hits tell nothing
+    before_s: float = within(0.35, 0.05, 5.0)  # age of the scan before, at most ...
+    matched_s: float = within(1.5, 0.1, 60.0)
+    """... and of the last one matched: since then the wheels err by centimetres."""
+    memory: float = within(0.05, 1e-3, 1.0)  # share of the newest scan in the usual quality
+    carried_s: float = within(1.0, 0.1, 60.0)
+    """Wheels in the air for so long: carried; shorter ones are door sills."""
 
-    inflate: float = 2.0  # of the standard deviations: errors of one match after another are not independent
-    floor_m: float = 0.025  # ... and what stays even then, at a node made in this window,
-    known_floor_m: float = 0.05  # ... and at one known before: the map is bent, and walls repeat themselves
-    floor_rad: float = math.radians(0.5)
-    doubted: float = 0.6  # quality of a pose that the window does not bear out, at most
-    good_fit: float = 0.85  # of the usual quality: nothing to doubt
-    bad_fit: float = 0.55  # no quality left
+    inflate: float = within(2.0, 1.0, 20.0)
+    """Of the standard deviations: errors of one match after another are not independent."""
+    floor_m: float = within(0.025, 1e-3, 1.0)
+    """... and what stays even then, at a node made in this window,."""
+    known_floor_m: float = within(0.05, 1e-3, 1.0)
+    """... and at one known before: the map is bent, and walls repeat themselves."""
+    floor_rad: float = within(math.radians(0.5), 1e-4, 0.5)
+    doubted: float = within(0.6, 0.0, 1.0)  # quality of a pose that the window does not bear out, at most
+    good_fit: float = within(0.85, 0.1, 1.0)  # of the usual quality: nothing to doubt
+    bad_fit: float = within(0.55, 0.0, 1.0)  # no quality left
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lemtomap.se2 import Pose, wrap_angle
+from lemtomap.settings import within
 from lemtomap.types import Odometry
 
 
@@ -20,14 +21,14 @@ from lemtomap.types import Odometry
 class MotionNoise:
     """How fast odometry's covariance grows. Defaults: tools/odometry_noise over 12 simulated robots."""
 
-    along_m_per_m: float = 0.007
+    along_m_per_m: float = within(0.007, 1e-4, 0.5)
     """Standard deviation along the path for each metre: a wheel's radius is wrong everywhere alike."""
-    along_m_per_sqrt_m: float = 0.0065
+    along_m_per_sqrt_m: float = within(0.0065, 1e-5, 0.5)
     """The same of slip, which forgets itself: grows with the square root of the distance."""
-    across_m_per_sqrt_m: float = 0.004
-    yaw_rad_per_rad: float = 0.007
+    across_m_per_sqrt_m: float = within(0.004, 1e-5, 0.5)
+    yaw_rad_per_rad: float = within(0.007, 1e-4, 0.5)
     """The gyro's scale."""
-    yaw_rad_per_sqrt_s: float = 0.0005
+    yaw_rad_per_sqrt_s: float = within(0.0005, 1e-6, 0.1)
     """The gyro's wander, standing or not: 0.03 deg/s per root Hz (data sheet)."""
 
     def covariance(self, distance_m: float, turn_rad: float, elapsed_s: float) -> NDArray[np.float64]:
@@ -43,17 +44,21 @@ class MotionNoise:
 class OdometryConfig:
     """Geometry of the base, and when it stands still."""
 
-    metres_per_tick: float = 1.0 / 11724.41658029856624751591  # kobuki_core, diff_drive.hpp
-    wheel_base_m: float = 0.23  # kobuki_core
-    wheel_scale: float = 1.0
+    metres_per_tick: float = within(1.0 / 11724.41658029856624751591, 7e-5, 1e-4)
+    """From kobuki_core, diff_drive.hpp."""
+    wheel_base_m: float = within(0.23, 0.2, 0.26)  # kobuki_core
+    wheel_scale: float = within(1.0, 0.8, 1.25)
     """True distance over odometry's, of this robot's wheels."""
-    max_wheel_mps: float = 1.2  # the Kobuki does 0.7; faster is a base that was switched off and on
-    still_after_s: float = 0.5
+    max_wheel_mps: float = within(1.2, 0.7, 3.0)
+    """The Kobuki does 0.7; faster is a base that was switched off and on."""
+    still_after_s: float = within(0.5, 0.1, 10.0)
     """No tick for this long is standing still."""
-    still_rate_radps: float = 0.02  # 1.1 deg/s: the base is not being carried or turned by hand
-    bias_memory_s: float = 60.0
+    still_rate_radps: float = within(0.02, 0.001, 0.2)
+    """1.1 deg/s: the base is not being carried or turned by hand."""
+    bias_memory_s: float = within(60.0, 1.0, 3600.0)
     """The gyro's drift is the mean over so much standing."""
-    max_bias_radps: float = 0.01  # kobuki#371: "a couple of degrees a minute at worst", with a wide margin
+    max_bias_radps: float = within(0.01, 0.0, 0.1)
+    """From kobuki#371: "a couple of degrees a minute at worst", with a wide margin."""
     noise: MotionNoise = field(default_factory=MotionNoise)
 
 

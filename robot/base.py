@@ -29,6 +29,7 @@ from robot.notes import describe_event
 from robot.reflex import Retreat
 from robot.safety import Allowed, Evidence, Reason, SafetyGate, Sides
 from robot.velocity import DOCKING, NAVIGATION, SAFETY, TELEOP, VelocityMux, VelocitySmoother, Wish
+from robot.watchdog import Watchdog
 
 SCAN_PATIENCE_S = 0.3  # a scan whose odometry has not come by then belongs to a silent base
 
@@ -52,6 +53,7 @@ class BaseStep:
         self._buffer = OdometryBuffer()
         self._mux, self._smoother = VelocityMux(), VelocitySmoother(config.smoother)
         self._retreat, self._indicators = Retreat(), Indicators()
+        self._watchdog = Watchdog(exchange)
         self._docking: Docking | None = None
         self._sample: KobukiSample | None = None
         self._last: Odometry | None = None
@@ -158,6 +160,7 @@ class BaseStep:
         self._scan = timed
         if seen.complete:  # a damaged scan still shows obstacles, but never reaches the map
             self._exchange.scans.put(timed)
+            self._watchdog.saw(scan.stamp_s, seen.arrival_s)
         self._exchange.sightings.put(sighting)
         self._exchange.last_scan.put(timed)
 
@@ -170,7 +173,7 @@ class BaseStep:
         wanted = wish.twist if wish is not None else Twist()
         smooth = self._smoother.step(wanted, self._elapsed_s(now_s))
         stamp_s = wish.stamp_s if wish is not None else -math.inf
-        sent = self.gate.check(smooth.v_mps, smooth.w_radps, self._evidence(stamp_s), now_s)
+        sent = self.gate.check(smooth.v_mps, smooth.w_radps, self._evidence(stamp_s, now_s), now_s)
         self._smoother.note_sent(sent.v_mps, sent.w_radps)
         self._bumped = self._fell = Sides()
         self._note_reason(sent.reason, now_s)
@@ -193,13 +196,17 @@ class BaseStep:
         self._commanded_s = now_s
         return elapsed_s
 
-    def _evidence(self, velocity_stamp_s: float) -> Evidence:
+    def _evidence(self, velocity_stamp_s: float, now_s: float) -> Evidence:
         sample, scan, last = self._sample, self._scan, self._last
+        map_stamp_s = self._watchdog.map_stamp_s(now_s)
+        cycle_stamp_s = self._watchdog.cycle_stamp_s(now_s)
         if sample is None or last is None:
-            return Evidence(velocity_stamp_s=velocity_stamp_s)
+            return Evidence(velocity_stamp_s, map_stamp_s=map_stamp_s, cycle_stamp_s=cycle_stamp_s)
         points = np.zeros((0, 2)) if scan is None else bridge.points_now(scan.sighting, last)
         return Evidence(
             velocity_stamp_s=velocity_stamp_s,
+            map_stamp_s=map_stamp_s,
+            cycle_stamp_s=cycle_stamp_s,
             base_stamp_s=sample.arrival_s,
             bumper=bridge.sides_of_bumper(sample.bumper) | self._bumped,
             cliff=bridge.sides_of_cliff(sample.cliff) | self._fell,

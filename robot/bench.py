@@ -2,12 +2,12 @@
 
 import pkgutil
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import tools
 from lemtomap.errors import BadSetting
+from robot.child import python
 
 PREFIX = "bench_"
 
@@ -32,5 +32,5 @@ def run_bench(name: str, arguments: Sequence[str]) -> int:
     known = benches()
     if name not in known:
         raise BadSetting(f"bench '{name}': must be one of {', '.join(sorted(known))}")
-    command = [sys.executable, "-m", f"tools.{PREFIX}{name}", *arguments]
+    command = python("-m", f"tools.{PREFIX}{name}", *arguments)
     return subprocess.run(command, check=False).returncode  # noqa: S603 - our own interpreter and module

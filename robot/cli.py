@@ -8,6 +8,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from typing import Annotated
 
 import typer
 
@@ -28,18 +29,32 @@ app = typer.Typer(
         "lemtomap sim                              the whole robot in simulation, no hardware needed\n"
         "lemtomap run --map office.lemto           the real robot on two USB cables\n"
         "lemtomap map intel.clf --out out/intel    a recorded log\n"
-        "lemtomap doctor                           what is missing, and its cure"
+        "lemtomap doctor                           what is missing, and its cure\n"
+        "lemtomap --install-completion             let the shell complete commands and options"
     ),
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 
 
+def _say_version(wanted: bool) -> None:  # noqa: FBT001 - typer's signature
+    if wanted:
+        from robot.outputs import versions
+
+        typer.echo("\n".join(f"{name} {version}" for name, version in versions().items()))
+        raise typer.Exit
+
+
 @app.callback()
-def _program() -> None:
-    """Keep subcommands even while there is only one."""
+def _program(
+    *,
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_say_version, is_eager=True, help="say which version this is"),
+    ] = False,
+) -> None:
+    """Take what concerns no single command."""
 
 
 cli_drive.register(app)

@@ -1,26 +1,28 @@
 """The robot's settings: frozen dataclasses of every stage, read from one TOML file and checked.
 
-An unknown key, a value of the wrong type, a negative limit, or two ports that were swapped are refused in one
-line that names file, line and key. Nothing is repaired silently.
+An unknown key, a value of the wrong type or outside the range declared beside its default, or two ports that
+were swapped are refused in one line that names file, line, key, value and rule. Nothing is repaired silently.
 """
 
 import dataclasses
 import re
 import tomllib
-import types
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AllowInfNan, BaseModel, ConfigDict, Field, Strict, ValidationError, create_model
+from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Strict, ValidationError, create_model
+from pydantic_core import PydanticCustomError
 
 from lemtomap.errors import BadSetting
 from lemtomap.grid.config import SlamConfig
 from lemtomap.nav.config import NavConfig
 from lemtomap.odometry import OdometryConfig
+from lemtomap.settings import Range, range_of, within
 from lemtomap.topo.config import TopoConfig
 from robot.ports import HOKUYO, KOBUKI, ListPorts, describe, matches_identity
 from robot.safety import SafetyLimits
@@ -39,11 +41,11 @@ class PortsConfig:
 
 @dataclass(frozen=True, slots=True)
 class LaserConfig:
-    """Where the laser sits on the base; these three may be negative."""
+    """Where the laser sits on the base."""
 
-    x_m: float = 0.0
-    y_m: float = 0.0
-    yaw_rad: float = 0.0
+    x_m: float = within(0.0, -0.3, 0.3, "it stands on the base")
+    y_m: float = within(0.0, -0.3, 0.3, "it stands on the base")
+    yaw_rad: float = within(0.0, -3.15, 3.15)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,36 +143,42 @@ def _line_of(key: Key, lines: Mapping[Key, int]) -> int:
 def _reason(error: Mapping[str, Any]) -> str:
     shown = repr(error["input"])
     text = str(error["msg"]).removeprefix("Input should be ").removeprefix("Input ")
-    return f"{shown if len(shown) < 60 else 'value'} must be {text}"
+    rule = text if error["type"] == "range" else f"must be {text}"
+    return f"{shown if len(shown) < 60 else 'value'} {rule}"
 
 
+@cache
 def _model_of(cls: Any) -> type[BaseModel]:
     """Return a pydantic model with the dataclass' fields, unknown keys forbidden."""
     hints = typing.get_type_hints(cls)
     fields: dict[str, Any] = {}
     for f in dataclasses.fields(cls):
-        default = f.default if f.default is not dataclasses.MISSING else None
-        if default is None and f.default_factory is not dataclasses.MISSING:
-            default = f.default_factory()
-        fields[f.name] = (_checked(hints[f.name], default), default)
+        made = f.default_factory is not dataclasses.MISSING
+        default = f.default_factory() if f.default_factory is not dataclasses.MISSING else f.default
+        fields[f.name] = (_model_of(hints[f.name]) if made else _checked(hints[f.name], f), default)
     model: type[BaseModel] = create_model(
         cls.__name__, __config__=ConfigDict(extra="forbid", arbitrary_types_allowed=True), **fields
     )
     return model
 
 
-def _checked(hint: Any, default: Any) -> Any:
-    """Return the field's type with its limits: finite, and not negative where the default is not."""
-    if dataclasses.is_dataclass(hint):
-        return _model_of(hint)
-    if hint is bool or isinstance(hint, types.GenericAlias):
+def _checked(hint: Any, declared: "dataclasses.Field[Any]") -> Any:
+    """Return the field's type with its rules: a number is finite and in its range, and no truth value."""
+    allowed = range_of(declared)
+    if allowed is None:
         return hint
-    if hint in (int, float):
-        marks: list[Any] = [AllowInfNan(False)] if hint is float else [Strict()]
-        if default is None or default >= 0:
-            marks.append(Field(ge=0))
-        return Annotated[hint, *marks]
-    return hint
+    counts = int in (hint, *typing.get_args(hint))
+    check = AfterValidator(partial(_in_range, allowed))
+    ranged: Any = (
+        Annotated[int, Strict(), check] if counts else Annotated[float, AllowInfNan(False), Strict(), check]
+    )
+    return ranged | None if declared.default is None else ranged
+
+
+def _in_range(allowed: Range, value: float) -> float:
+    if value not in allowed:
+        raise PydanticCustomError("range", "{rule}", {"rule": f"must lie {allowed}"})
+    return value
 
 
 def _build(cls: Any, model: BaseModel, key: Key) -> Any:

@@ -84,15 +84,17 @@ class RobotCore:
         return _timed(self.efforts.base, lambda: self.base.command(now_s))
 
     def map_one(self, timeout_s: float) -> bool:
-        """Mapping: take one scan if there is one within the time; tell whether there was."""
+        """Mapping: take one scan if there is one within the time; return True if there was."""
         timed = self.exchange.scans.get(timeout_s)
         if timed is None:
             return False
         _timed(self.efforts.mapping, lambda: self.mapping.step(timed))
+        self.exchange.mapped.put(timed.scan.stamp_s)
         return True
 
     def navigate(self, now_s: float) -> None:
         """Navigation: run one cycle."""
+        self.exchange.cycle.put(now_s)
         _timed(self.efforts.navigation, lambda: self.navigation.step(now_s))
 
     def permit(self) -> None:

@@ -23,6 +23,7 @@ from robot.clock import MonotonicClock
 from robot.findings import BASE, LASER, Finding, Verdict, judge_base, judge_error, judge_laser
 from robot.outputs import versions
 from robot.ports import Identity, ListPorts
+from sim.errors import NoPhysics
 
 LISTEN_S = 6.0  # a laser needs 1 s to connect; the rest shows drift, noise and dirt
 SLOW_TIMER_MS = 1
@@ -52,7 +53,7 @@ def check_machine() -> Iterator[Finding]:
     known = versions()
     yield Finding(Verdict.GOOD, "program", ", ".join(f"{name} {version}" for name, version in known.items()))
     if find_spec("pybullet") is None:
-        yield Finding(Verdict.WARNING, "program", "no simulator", "pip install 'lemtomap[sim]'")
+        yield Finding(Verdict.WARNING, "program", "no simulator", str(NoPhysics()))
     with contextlib.suppress(KeyError):
         dialout = grp.getgrnam("dialout").gr_gid
         if os.getuid() != 0 and dialout not in os.getgroups():

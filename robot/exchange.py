@@ -107,7 +107,11 @@ class Exchange:
         self.sightings: BoundedQueue[Sighting] = BoundedQueue("sightings for navigation", SCANS_WAITING)
         self.contacts: BoundedQueue[Contact] = BoundedQueue("contacts for navigation", EVENTS_WAITING)
         self.nav_events: BoundedQueue[NavEvent] = BoundedQueue("events for the mapper", EVENTS_WAITING)
+        self.mapped: Latest[float] = Latest()
+        """Stamp of the scan that mapping finished last."""
         self.map_view: Latest[MapView] = Latest()
+        self.cycle: Latest[float] = Latest()
+        """When navigation began its latest cycle."""
         self.nav_output: Latest[NavOutput] = Latest()
         self.dock: Latest[bool] = Latest()
         """True: drive onto the charging dock."""

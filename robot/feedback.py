@@ -2,7 +2,8 @@
 
 LED 1 (motion)   green: drives   orange: waits or is held up   red: the safety gate stops it   off: idle
 LED 2 (mind)     green: knows where it is   red: lost   orange: battery low (before all else)
-sounds           goal reached, goal given up, lost, stopped by contact, battery low: once each time it begins
+sounds           goal reached, goal given up, lost, stopped by contact, a part that hangs, battery low: once
+                 each time it begins
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,16 @@ from drivers.kobuki.session import KobukiSession
 from lemtomap.nav.types import NavState
 from robot.safety import Reason
 
-CONTACT = frozenset({Reason.BUMPER, Reason.CLIFF, Reason.WHEEL_DROP, Reason.OVER_CURRENT})
+ALARMING = frozenset(
+    {
+        Reason.BUMPER,
+        Reason.CLIFF,
+        Reason.WHEEL_DROP,
+        Reason.OVER_CURRENT,
+        Reason.MAPPING_HANGS,
+        Reason.NAVIGATION_HANGS,
+    }
+)
 QUIET = frozenset(
     {Reason.CLEAR, Reason.LIMIT, Reason.NEAR_OBSTACLE, Reason.VELOCITY_SILENT, Reason.NOT_PERMITTED}
 )
@@ -100,7 +110,7 @@ def _sounds(before: Condition, now: Condition) -> list[Tune]:
     if now.nav_state is NavState.ARRIVED and before.nav_state is not NavState.ARRIVED:
         tunes.append(Tune.CLEANING_END)
     failed = now.nav_state is NavState.FAILED and before.nav_state is not NavState.FAILED
-    if failed or (now.lost and not before.lost) or (now.reason in CONTACT and before.reason not in CONTACT):
+    if failed or (now.lost and not before.lost) or (now.reason in ALARMING and before.reason not in ALARMING):
         tunes.append(Tune.ERROR)
     if now.battery_low and not before.battery_low:
         tunes.append(Tune.RECHARGE)

@@ -11,6 +11,7 @@ from drivers.driver import PortLost
 from drivers.errors import DriverError, PortDenied, WrongDevice
 from drivers.hokuyo import events as hokuyo
 from drivers.hokuyo.packets import BadReply
+from drivers.identify import HOKUYO, KOBUKI
 from drivers.kobuki import events as kobuki
 from drivers.kobuki.battery import Level as BatteryLevel
 from drivers.kobuki.battery import Source
@@ -53,7 +54,9 @@ def judge_error(subject: str, error: DriverError) -> Finding:
     """Return the finding for a port that could not be used; the error's text holds the cure."""
     cure = ""
     if isinstance(error, WrongDevice):
-        cure = "are the two ports swapped? Leave --kobuki and --hokuyo away to let them be found"
+        swapped = any(f"but {name}" in str(error) for name in (KOBUKI, HOKUYO))
+        doubt = "are the two ports swapped?" if swapped else "is it the right port?"
+        cure = f"{doubt} Leave --kobuki and --hokuyo away to let them be found"
     elif isinstance(error, PortDenied):
         cure = "or install the udev rules: tools/udev/60-lemtomap.rules"
     return Finding(Verdict.FAULT, subject, str(error), cure)

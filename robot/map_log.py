@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,7 +28,6 @@ PARTICLES = {"window": 1, "gmapping": 30}  # growing grid: what Grisetti et al. 
 BAR_PERIOD_S = 0.2
 PROFILE_ROWS = 200
 MOST_REMARKS = 5
-FIRST_SCANS = 50  # by then every kernel has run
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +109,8 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
         recogniser = None if options.slam == "gmapping" else LoopRecogniser()
         topo = TopoMapper(TopoConfig(), store, recogniser=recogniser)
         try:
-            drive = _drive(log, Mapper(lambda: slam, topo, watched=False), slam, bar)
+            with first_use(bar):
+                drive = _drive(log, Mapper(lambda: slam, topo, watched=False), slam, bar)
             final = map_on_path(topo, grid.path()) if isinstance(grid, GrowingGmapping) else final_map(topo)
             view = topo.view()
         finally:
@@ -142,12 +141,8 @@ def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
     drive = _Drive()
     stride = max(1, len(log) // PROFILE_ROWS)
     shown_s, begun_s, begun_cpu_s = -math.inf, time.perf_counter(), time.process_time()
-    compiling = ExitStack()
-    compiling.enter_context(first_use(bar))
     for index, (odometry, scan) in enumerate(log):
         update = mapper.update(scan, odometry).slam
-        if index == FIRST_SCANS:
-            compiling.close()
         drive.stamps_s.append(scan.stamp_s)
         if update is not None and update.integrated:
             drive.updates += 1
@@ -159,7 +154,6 @@ def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
         if index % stride == 0:
             topo_cpu_s = time.process_time() - begun_cpu_s - slam.cpu_s
             drive.profile.append((index / len(log), slam.cpu_s, topo_cpu_s, outputs.rss_mb()))
-    compiling.close()
     bar.show(1.0, len(log))
     drive.grid_cpu_s = slam.cpu_s
     drive.topo_cpu_s = time.process_time() - begun_cpu_s - slam.cpu_s

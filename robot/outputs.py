@@ -129,13 +129,13 @@ def rss_mb() -> float:
 
 def versions() -> dict[str, str]:
     """Return what made the result: Python, this package and the libraries that move numbers."""
-    found = {"python": sys.version.split()[0]}
+    found = {}
     for name in ("lemtomap", "numpy", "scipy", "numba", "rerun-sdk", "pybullet"):
         try:
             found[name] = version(name)
         except PackageNotFoundError:
             found[name] = "not installed"
-    return found
+    return found | {"python": sys.version.split()[0]}
 
 
 def file_bytes(path: Path) -> int:

@@ -1,16 +1,16 @@
 """A progress bar for long work: share, rate, speed against real time, time left; silent on no terminal."""
 
 import sys
-import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from numba.core import event
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-COMPILING = "compiling for this machine: some 20 s, this once"
-COMPILING_AFTER_S = 2.0  # kernels that were compiled before load faster
+COMPILING = "compiling for this machine: about a minute, this once"
 
 
 @dataclass(slots=True)
@@ -35,14 +35,38 @@ class Bar:
 
 @contextmanager
 def first_use(bar: Bar) -> Iterator[None]:
-    """Say what takes so long when the body, which runs every kernel once, has to compile them."""
-    timer = threading.Timer(COMPILING_AFTER_S, bar.say, [COMPILING])
-    timer.daemon = True
-    timer.start()
-    try:
+    """Say so when the body runs a kernel that must be compiled, not loaded; and then how long it took."""
+    compiling = _Compiling(bar)
+    with event.install_listener("numba:compile", compiling):
         yield
-    finally:
-        timer.cancel()
+    if compiling.told:
+        bar.say(f"compiled: {compiling.took_s:.0f} s")
+
+
+class _Compiling(event.Listener):
+    """Speaks up at the first kernel that is compiled, and adds up the time."""
+
+    def __init__(self, bar: Bar) -> None:
+        self.told = False
+        self.took_s = 0.0
+        self._bar = bar
+        self._nested = 0
+        self._begun_s = 0.0
+
+    def on_start(self, event: object) -> None:  # noqa: ARG002 - numba's signature
+        """Take note that a kernel is being compiled; those it calls are compiled within its time."""
+        if self._nested == 0:
+            self._begun_s = time.perf_counter()
+        self._nested += 1
+        if not self.told:
+            self.told = True
+            self._bar.say(COMPILING)
+
+    def on_end(self, event: object) -> None:  # noqa: ARG002 - numba's signature
+        """Take note that it is done."""
+        self._nested -= 1
+        if self._nested == 0:
+            self.took_s += time.perf_counter() - self._begun_s
 
 
 @contextmanager

@@ -12,6 +12,8 @@ restrictive wins, and the reason names the rule that took something away:
     settling          0.5 s after each of the three above           stop
     adapter           the charging cable is plugged in              stop
     battery empty     dangerously low for 5 s                       stop
+    mapping hangs     a scan waits for the map for 0.25 s           stop
+    navigation hangs  no cycle was begun for 0.25 s                 stop
     velocity silent   no fresh velocity for 0.3 s                   stop
     scan silent       no scan for 0.5 s and motion wanted           stop
     scan blind        (almost) no beam of the scan is valid         stop
@@ -30,6 +32,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.settings import check_ranges, within
 from robot.proximity import free_travel_m
 
 CLOCK_SLACK_S = (
@@ -49,6 +52,8 @@ class Reason(StrEnum):
     SETTLING = "settling"
     ADAPTER = "charging cable plugged in"
     BATTERY_EMPTY = "battery empty"
+    MAPPING_HANGS = "mapping hangs"
+    NAVIGATION_HANGS = "navigation hangs"
     VELOCITY_SILENT = "velocity silent"
     SCAN_SILENT = "scan silent"
     SCAN_BLIND = "scan blind"
@@ -60,27 +65,42 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class SafetyLimits:
-    """Limits of the gate. Kobuki: reference, sections 8, 10, 12 and 14."""
+    """Limits of the gate, each with its default, the bounds that nothing leaves, and why.
 
-    v_max_mps: float = 0.65  # Kobuki's 0.70 less a margin for the wheel controller's overshoot
-    reverse_max_mps: float = 0.20  # the laser sees nothing behind
-    w_max_radps: float = 1.9  # 110 deg/s: the gyro degrades above
-    back_off_mps: float = 0.10  # the official safety controller's retreat
-    bumped_w_max_radps: float = 0.50
-    velocity_age_s: float = 0.3
-    base_age_s: float = 0.2
-    scan_age_s: float = 0.5
-    settle_s: float = 0.5
-    battery_empty_v: float = 13.2  # the official driver's "dangerous"
-    battery_hold_s: float = 5.0  # the voltage sags while the motors start
-    scan_valid_beams: int = 10
-    body_radius_m: float = 0.18  # Kobuki 0.178 with bumper
-    side_margin_m: float = 0.01  # navigation keeps 0.015: the gate must not hold what navigation steers past
-    stop_gap_m: float = 0.025
-    creep_share: float = 0.05
-    brake_mps2: float = 0.8  # gentle enough for a laptop on top
-    reaction_s: float = 0.12  # one scan period and one output period
-    own_parts_m: float = 0.15  # nearer points are the robot's own posts and cables
+    Kobuki: reference, sections 8, 10, 12 and 14. Raises BadSetting.
+    """
+
+    v_max_mps: float = within(0.65, 0.05, 0.65, "a Kobuki does 0.70 and its wheel controller overshoots")
+    reverse_max_mps: float = within(0.20, 0.02, 0.20, "the laser sees nothing behind")
+    w_max_radps: float = within(1.9, 0.1, 1.92, "the gyro degrades above 110 deg/s")
+    back_off_mps: float = within(0.10, 0.02, 0.15, "nothing is seen behind")
+    """The official safety controller's retreat."""
+    bumped_w_max_radps: float = within(0.50, 0.05, 1.0, "it turns while it touches something")
+    velocity_age_s: float = within(0.3, 0.1, 0.5, "navigation speaks every 0.1 s")
+    base_age_s: float = within(0.2, 0.04, 0.5, "a packet comes every 0.02 s")
+    scan_age_s: float = within(0.5, 0.15, 0.8, "a scan comes every 0.1 s")
+    map_age_s: float = within(0.25, 0.15, 0.5, "a scan comes every 0.1 s")
+    """Mapping takes some tens of milliseconds; a robot whose mapping hangs stands within 0.3 s."""
+    cycle_age_s: float = within(0.25, 0.15, 0.5, "navigation begins a cycle every 0.1 s")
+    settle_s: float = within(0.5, 0.2, 10.0, "wheels and people come to rest")
+    battery_empty_v: float = within(13.2, 13.0, 15.0, "the pack switches itself off soon below")
+    """The official driver's "dangerous"."""
+    battery_hold_s: float = within(5.0, 0.5, 30.0, "the voltage sags while the motors start, not for longer")
+    scan_valid_beams: int = within(10, 5, 300, "a covered laser sees no obstacle either")
+    body_radius_m: float = within(0.18, 0.178, 0.5, "a Kobuki with its bumper is 0.178 m round")
+    side_margin_m: float = within(0.01, 0.005, 0.2, "a range is right to a centimetre")
+    """Navigation keeps 0.015: the gate must not hold what navigation steers past."""
+    stop_gap_m: float = within(0.025, 0.01, 0.5, "wheels stop a little late")
+    creep_share: float = within(0.05, 0.01, 0.2, "only a robot that almost stands turns unharmed")
+    brake_mps2: float = within(0.8, 0.1, 1.2, "wheels slip above, doors are too narrow below")
+    """Gentle enough for a laptop on top."""
+    reaction_s: float = within(0.12, 0.1, 1.0, "a scan period passes before anything is seen")
+    """One scan period and one output period."""
+    own_parts_m: float = within(0.15, 0.0, 0.17, "what lies outside the body is no part of it")
+    """Nearer points are the robot's own posts and cables."""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +126,10 @@ class Evidence:
 
     velocity_stamp_s: float = -math.inf
     base_stamp_s: float = -math.inf
+    map_stamp_s: float = -math.inf
+    """All scans until then are in the map, or known to be of no use to it."""
+    cycle_stamp_s: float = -math.inf
+    """When navigation began its latest cycle."""
     scan_stamp_s: float = -math.inf
     bumper: Sides = field(default_factory=Sides)
     cliff: Sides = field(default_factory=Sides)
@@ -147,7 +171,11 @@ class SafetyGate:
 
     def check(self, v_mps: float, w_radps: float, evidence: Evidence, now_s: float) -> Allowed:
         """Return what may be sent now. Holds: never faster than wanted, never another direction."""
-        stop = self._fault(evidence, now_s) or self._silence(v_mps, w_radps, evidence, now_s)
+        stop = (
+            self._fault(evidence, now_s)
+            or self._hung(evidence, now_s)
+            or self._silence(v_mps, w_radps, evidence, now_s)
+        )
         if not (math.isfinite(v_mps) and math.isfinite(w_radps)):
             stop = Reason.BAD_COMMAND
         if stop is not None:
@@ -183,6 +211,14 @@ class SafetyGate:
         since_s = self._battery_low_since_s
         if since_s is not None and now_s - since_s >= self.limits.battery_hold_s:
             return Reason.BATTERY_EMPTY
+        return None
+
+    def _hung(self, evidence: Evidence, now_s: float) -> Reason | None:
+        """Judge the robot's own threads, also while it stands: else it would stand for ever, unexplained."""
+        if not _fresh(evidence.map_stamp_s, now_s, self.limits.map_age_s):
+            return Reason.MAPPING_HANGS
+        if not _fresh(evidence.cycle_stamp_s, now_s, self.limits.cycle_age_s):
+            return Reason.NAVIGATION_HANGS
         return None
 
     def _silence(self, v_mps: float, w_radps: float, evidence: Evidence, now_s: float) -> Reason | None:

@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any, Self
 
 from lemtomap.errors import BadInput
 from lemtomap.se2 import Pose, pose
+from robot.child import python
 
 END_S = 5.0  # for the server to tell the truth and go
 
@@ -33,7 +33,7 @@ class FakeHardware:
 
     def __enter__(self) -> Self:
         """Start the server; raises BadInput with the server's own line when it cannot."""
-        command = [sys.executable, "-m", "sim.serve", "--world", self.world, "--seed", str(self.seed)]
+        command = python("-m", "sim.serve", "--world", self.world, "--seed", str(self.seed))
         command += ["--parent", str(os.getpid())] + ["--gui"] * self.gui
         self._folder = tempfile.TemporaryDirectory(prefix="lemtomap-")
         command += ["--truth", str(self._truth_path)]

@@ -8,6 +8,7 @@ smoother what was really sent, so that the next start ramps up from there.
 import math
 from dataclasses import dataclass
 
+from lemtomap.settings import check_ranges, within
 from lemtomap.types import Twist
 
 
@@ -63,12 +64,18 @@ class VelocityMux:
 
 @dataclass(frozen=True, slots=True)
 class SmootherConfig:
-    """Acceleration limits; the official limiter has 0.5 / 0.6 m/s2 and 3.5 / 4.2 rad/s2 (reference, 8)."""
+    """Acceleration limits; the official limiter has 0.5 / 0.6 m/s2 and 3.5 / 4.2 rad/s2 (reference, 8).
 
-    accel_mps2: float = 0.5
-    brake_mps2: float = 0.8
-    turn_radps2: float = 3.5
-    turn_brake_radps2: float = 4.2
+    Raises BadSetting.
+    """
+
+    accel_mps2: float = within(0.5, 0.05, 1.5, "a laptop stands on top")
+    brake_mps2: float = within(0.8, 0.2, 3.0, "a slow stop is left to the gate, which stops at once")
+    turn_radps2: float = within(3.5, 0.2, 15.0, "a laptop stands on top")
+    turn_brake_radps2: float = within(4.2, 0.5, 15.0, "a robot that turns on misses its way")
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 class VelocitySmoother:

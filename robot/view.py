@@ -1,10 +1,10 @@
 """Opening a recording: in a window, in a browser, or by telling the user how."""
 
 import subprocess
-import sys
 from pathlib import Path
 
 from lemtomap.errors import BadInput
+from robot.child import python
 from robot.display import has_display
 
 RRD_MAGIC = b"RRF"  # Rerun's files begin with RRF and their version, RRF2 today
@@ -15,7 +15,7 @@ def open_recording(path: Path, *, web: bool = False) -> None:
     recording = find_recording(path)
     if not web and not has_display():
         raise BadInput(how_to_look(recording))
-    command = [sys.executable, "-m", "rerun", str(recording), *(["--serve-web"] if web else [])]
+    command = python("-m", "rerun", str(recording), *(["--serve-web"] if web else []))
     code = subprocess.run(command, check=False).returncode  # noqa: S603 - our own interpreter, a checked path
     if code:
         raise BadInput(f"{recording}: the Rerun viewer ended with code {code}")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import SimError
+from sim.errors import NoPhysics, SimError
 from sim.world import ALBEDO, Box, Pose2, Surface, World
 
 
@@ -31,8 +31,11 @@ def _silent_stderr() -> Any:
         os.close(null)
 
 
-with _silent_stderr():
-    import pybullet
+try:
+    with _silent_stderr():
+        import pybullet
+except ImportError as missing:
+    raise NoPhysics from missing
 
 SOLID_MASK = 1 | 2 | 4  # pybullet's default, static and kinematic groups
 GLASS_GROUP = 64

@@ -11,6 +11,7 @@ steadier than either time. Ratios are new over old; a change counts when its 95 
 
 import argparse
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from robot.child import python
 from tools.mapping_runs import slam_cpu_s, table
 
 NOISE = 0.05  # without repetitions, ratios this near to 1 say nothing on a shared machine
@@ -126,8 +128,9 @@ def paired(revision: str, log: Path, pairs: int, slam: str) -> str:
 
 def _map(root: Path, log: Path, out: Path, slam: str) -> dict[str, Any]:
     shutil.rmtree(out, ignore_errors=True)
-    command = [sys.executable, "-m", "robot", "map", str(log.resolve()), "--out", str(out), "--slam", slam]
-    subprocess.run(command, check=True, cwd=root, stdout=subprocess.DEVNULL)  # noqa: S603 - our own program
+    command = python("-m", "robot", "map", str(log.resolve()), "--out", str(out), "--slam", slam)
+    environment = {**os.environ, "PYTHONPATH": str(root)}  # this version's own modules
+    subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)  # noqa: S603 - our own program
     told: dict[str, Any] = json.loads((out / "summary.json").read_text())
     return told
 

@@ -17,7 +17,6 @@ import os
 import random
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -35,6 +34,7 @@ from drivers.kobuki.driver import KobukiDriver
 from drivers.kobuki.events import KobukiSample
 from drivers.kobuki.session import KobukiSession
 from drivers.port import open_serial
+from robot.child import python
 from sim import worlds
 from sim.faults import Faults, LinkFaults
 from sim.simulator import Simulator
@@ -43,7 +43,7 @@ from sim.simulator import Simulator
 @contextlib.contextmanager
 def served_hardware() -> Iterator[tuple[str, str]]:
     """Serve the fake hardware from a process of its own; give the two paths."""
-    command = [sys.executable, "-m", "sim.serve", "--world", "office"]
+    command = python("-m", "sim.serve", "--world", "office")
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:  # noqa: S603  # our own program
         try:
             if server.stdout is None:
@@ -124,7 +124,7 @@ async def _stream_for_ever(paths: tuple[str, str]) -> None:
 async def measure_kill() -> None:
     """Print how long the next program takes."""
     with served_hardware() as paths:
-        command = [sys.executable, "-m", "tools.bench_drivers", "--stream", *paths]
+        command = python("-m", "tools.bench_drivers", "--stream", *paths)
         times = []
         for _ in range(5):
             pipe = subprocess.PIPE

@@ -15,7 +15,6 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -31,6 +30,7 @@ import psutil
 from drivers.port import open_serial
 from lemtomap.types import Twist
 from robot.build import build_core
+from robot.child import python
 from robot.config import RobotConfig
 from robot.lockstep import run_lockstep
 from robot.missions import Idle, Mission, parse_mission
@@ -57,7 +57,7 @@ class Hardware:
     @classmethod
     def start(cls, what: str, count: int) -> "Hardware":
         """Start it and learn its paths."""
-        command = [sys.executable, str(ROOT / "tools" / "measured_hardware.py"), what, str(count)]
+        command = python(str(ROOT / "tools" / "measured_hardware.py"), what, str(count))
         environment = dict(os.environ, PYTHONPATH=str(ROOT))
         process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)  # noqa: S603
         assert process.stdout is not None  # noqa: S101
@@ -146,7 +146,7 @@ def measure_kill() -> None:
     """Kill the program while it drives; the base must stop by itself; start again on the streaming sensor."""
     warm_up(RobotConfig())
     hardware = Hardware.start("still", 0)
-    command = [sys.executable, "-m", "robot", "run", "--kobuki", hardware.kobuki, "--hokuyo", hardware.hokuyo]
+    command = python("-m", "robot", "run", "--kobuki", hardware.kobuki, "--hokuyo", hardware.hokuyo)
     environment = dict(os.environ, PYTHONPATH=str(ROOT))
     out = tempfile.mkdtemp(prefix="lemtomap-kill-")
     victim = subprocess.Popen([*command, "--mission", "explore", "--out", out], env=environment)  # noqa: S603

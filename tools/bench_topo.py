@@ -30,6 +30,7 @@ from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.place import encode_place
 from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType, GridView, SlamUpdate
+from robot.child import python
 
 LANE_M = 100.0
 GAP_M = 3.0
@@ -198,7 +199,7 @@ def kill(args: argparse.Namespace) -> None:
     TopoStore.create(path).close()
     rng, clock, lost, place = np.random.default_rng(1), 0.0, [], encode_place(np.zeros((1, 2)))
     for k in range(args.times):
-        command = [sys.executable, "-c", WRITER, str(path), str(clock), str(1000.0 * k)]
+        command = python("-c", WRITER, str(path), str(clock), str(1000.0 * k))
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:  # noqa: S603
             assert writer.stdout is not None  # noqa: S101
             first = [writer.stdout.readline() for _ in range(WARM_SCANS)][-1]

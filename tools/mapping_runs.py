@@ -2,11 +2,12 @@
 
 import json
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from robot.child import python
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class MappingRun:
         told = self.out / "summary.json"
         if not told.exists():
             options = ["--slam", self.slam, "--particles", str(self.particles), "--seed", str(self.seed)]
-            command = [sys.executable, "-m", "robot", "map", str(self.log), "--out", str(self.out), *options]
+            command = python("-m", "robot", "map", str(self.log), "--out", str(self.out), *options)
             print(f"  {self.out.name}", flush=True)
             subprocess.run(command, check=True)  # noqa: S603 - our own interpreter and module
         found: dict[str, Any] = json.loads(told.read_text())

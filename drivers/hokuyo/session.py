@@ -31,7 +31,7 @@ from drivers.hokuyo.packets import (
 )
 from drivers.hokuyo.scans import ScanMaker, View
 from drivers.hokuyo.steps import Step
-from drivers.identify import HOKUYO, excerpt, name_device
+from drivers.identify import HOKUYO, excerpt, name_device, name_talker
 
 HokuyoEvent: TypeAlias = (
     LaserScan | SensorInfo | LaserFault | LaserWell | LaserUp | LaserDown | WrongDeviceSeen | BadReply
@@ -221,6 +221,8 @@ class HokuyoSession:
     def _rest(self, now_s: float, events: list[HokuyoEvent]) -> None:
         """Wait before the next attempt, longer after each that failed."""
         connection = self._connection
+        if self._foreign and self._name(name_talker(bytes(self._foreign), _FOREIGN_LIMIT), events):
+            return
         if connection.failure:
             self._report(now_s, connection.failure, connection.failure_code, events)
         wait_s = min(self.config.longest_rest_s, self.config.first_rest_s * 2.0**self._failures)
@@ -245,8 +247,13 @@ class HokuyoSession:
         if self._foreign is None:
             return
         self._foreign += data[: _FOREIGN_LIMIT - len(self._foreign)]
-        name = name_device(bytes(self._foreign), enough=_FOREIGN_LIMIT)
-        if name is not None and name != HOKUYO:
-            text = f"not a laser but {name} answers, it sent {excerpt(bytes(self._foreign))}"
-            events.append(WrongDeviceSeen(text))
-            self._foreign, self._stranger = None, True
+        self._name(name_device(bytes(self._foreign), _FOREIGN_LIMIT), events)
+
+    def _name(self, name: str | None, events: list[HokuyoEvent]) -> bool:
+        """Tell of a stranger by its name and what it sent; return True if there is one."""
+        if name is None or name == HOKUYO or self._foreign is None:
+            return False
+        text = f"not a laser but {name} answers, it sent {excerpt(bytes(self._foreign))}"
+        events.append(WrongDeviceSeen(text))
+        self._foreign, self._stranger = None, True
+        return True

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from drivers.clock import ClockConfig, DeviceClock
-from drivers.identify import KOBUKI, excerpt, name_device
+from drivers.identify import KOBUKI, excerpt, name_device, name_talker
 from drivers.kobuki.battery import BatteryConfig, BatteryModel
 from drivers.kobuki.codec import Decoder, encode
 from drivers.kobuki.commands import STOP, BaseControl, Led, Output, SetGains, Tune
@@ -46,6 +46,7 @@ class KobukiConfig:
     silence_s: float = 0.1  # kobuki_core: "not alive" without a packet for 0.1 s (five periods)
     clock_forgets_s: float = 0.5  # the base cannot boot faster
     probe_after_s: float = 1.5  # a base streams at once; what stays silent is asked whether it is a laser
+    judge_after_s: float = 2.5  # ... and judged by whatever it said until then
     ask: AskConfig = field(default_factory=AskConfig)
     clock: ClockConfig = field(default_factory=lambda: ClockConfig(bits=16, latency_s=0.008))
     """81 bytes at 115200 baud take 7 ms, the FTDI's latency timer 1 ms."""
@@ -130,6 +131,8 @@ class KobukiSession:
             self._probed = True
             self._queue.append(LinkDown(now_s, "nothing from the base: is it switched on?"))
             return b"\nQT\n"  # means nothing to a base that wakes up late; a laser answers, and can be named
+        if self._foreign and self._silent_s > config.judge_after_s:
+            self._name(name_talker(bytes(self._foreign)), self._queue)
         return self.identity.requests(now_s) if self.alive else b""
 
     def drive(self, v_mps: float, w_radps: float) -> bytes:
@@ -207,8 +210,12 @@ class KobukiSession:
         if self._foreign is None:
             return
         self._foreign += data[: _FOREIGN_LIMIT - len(self._foreign)]
-        name = name_device(bytes(self._foreign))
-        if name is not None and name != KOBUKI:
-            text = f"not a Kobuki base but {name} answers, it sent {excerpt(bytes(self._foreign))}"
-            events.append(WrongDeviceSeen(text))
-            self._foreign = None
+        self._name(name_device(bytes(self._foreign)), events)
+
+    def _name(self, name: str | None, events: list[KobukiEvent]) -> None:
+        """Tell of a stranger by its name and what it sent."""
+        if name is None or name == KOBUKI or self._foreign is None:
+            return
+        text = f"not a Kobuki base but {name} answers, it sent {excerpt(bytes(self._foreign))}"
+        events.append(WrongDeviceSeen(text))
+        self._foreign = None

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from lemtomap.displacement import WatchConfig
 from lemtomap.errors import BadSetting
+from lemtomap.settings import within
 from lemtomap.topo.align import MatchConfig
 
 
@@ -11,36 +12,54 @@ from lemtomap.topo.align import MatchConfig
 class TopoConfig:
     """Defaults hold for every building; a bad value is refused."""
 
-    new_node_distance_m: float = 1.0  # thesis section 3-3-2; ros_lemtomap A.3 new_node_distance
-    association_margin_m: float = 0.1  # a neighbour must be nearer by this: no flicker half-way between two
-    local_radius_m: float = 25.0  # local solve and D_nn, thesis section 3-3-2: the same; a window across
-    local_limit: int = 400  # nodes in a local solve at most, nearest first: bounds the step in dense maps
-    near_neighbour_max_m: float = 4.0  # ros_lemtomap A.3: the next node always lies well inside the window
-    near_neighbour_gain: float = (
-        0.02  # an edge must shorten the way between its ends by this share (Fig. 3-9)
-    )
-    near_neighbour_sigma_m: float = 0.2  # a node only predicted must be predicted this well: a robot's radius
-    seam_sigma_m: float = 0.5  # for an edge that is only driven along, from one round's nodes to another's
-    seam_open_sigma_m: float = 1.5  # ... in the open, where that much doubt leads through no wall
-    robot_radius_m: float = 0.18  # Kobuki's body, 351.5 mm across
-    occupied_from: int = 50  # occupancy of GridView that stops the robot
-    place_radius_m: float = 5.0  # half the window less the distance at which data is taken
-    place_taken_at_m: float = 3.5  # with the radius: still whole in a 20 m window, surroundings all seen
-    place_byte_budget: int = 240  # at most; some 150 on average, so that 300 hold with the descriptor
-    place_apart_m: float = 0.1  # half of what a point must be off all others to be another thing
-    place_new_within_m: float = 2.5  # of the node: what is new farther off may only not have been seen before
-    place_changes: int = 6  # points that are new or gone (0.3 m of surface) make another place, ...
-    place_stale_visits: int = 2  # ... and so many visits in a row that find it so have it taken anew
+    new_node_distance_m: float = within(1.0, 0.2, 10.0)
+    """Thesis section 3-3-2; ros_lemtomap A.3 new_node_distance."""
+    association_margin_m: float = within(0.1, 0.0, 5.0)
+    """A neighbour must be nearer by this: no flicker half-way between two."""
+    local_radius_m: float = within(25.0, 2.0, 100.0)
+    """Local solve and D_nn, thesis section 3-3-2: the same; a window across."""
+    local_limit: int = within(400, 10, 5000)
+    """Nodes in a local solve at most, nearest first: bounds the step in dense maps."""
+    near_neighbour_max_m: float = within(4.0, 0.5, 10.0)
+    """As ros_lemtomap A.3: the next node always lies well inside the window."""
+    near_neighbour_gain: float = within(0.02, 0.0, 1.0)
+    """An edge must shorten the way between its ends by this share (Fig. 3-9)."""
+    near_neighbour_sigma_m: float = within(0.2, 0.01, 2.0)
+    """A node only predicted must be predicted this well: a robot's radius."""
+    seam_sigma_m: float = within(0.5, 0.01, 5.0)
+    """For an edge that is only driven along, from one round's nodes to another's."""
+    seam_open_sigma_m: float = within(1.5, 0.01, 10.0)
+    """... in the open, where that much doubt leads through no wall."""
+    robot_radius_m: float = within(0.18, 0.1, 0.6)  # Kobuki's body, 351.5 mm across
+    occupied_from: int = within(50, 1, 100)  # occupancy of GridView that stops the robot
+    place_radius_m: float = within(5.0, 1.0, 30.0)
+    """Half the window less the distance at which data is taken."""
+    place_taken_at_m: float = within(3.5, 0.5, 30.0)
+    """With the radius: still whole in a 20 m window, surroundings all seen."""
+    place_byte_budget: int = within(240, 40, 4000)
+    """At most; some 150 on average, so that 300 hold with the descriptor."""
+    place_apart_m: float = within(0.1, 0.01, 1.0)
+    """Half of what a point must be off all others to be another thing."""
+    place_new_within_m: float = within(2.5, 0.5, 30.0)
+    """Of the node: what is new farther off may only not have been seen before."""
+    place_changes: int = within(6, 1, 1000)
+    """Points that are new or gone (0.3 m of surface) make another place, ..."""
+    place_stale_visits: int = within(2, 1, 100)
+    """... and so many visits in a row that find it so have it taken anew."""
     match: MatchConfig = field(default_factory=MatchConfig)
     watch: WatchConfig = field(default_factory=WatchConfig)
-    fresh_m: float = 10.0  # way after which a node's place in the window is measured again
-    align_again_m: float = 0.3  # a refused match is tried again after this way
-    align_widen: float = 2.0  # and its prediction believed that much less (variance), up to
-    align_widest_m: float = 0.3  # this standard deviation of its place
-    align_widest_rad: float = 0.05  # and of its heading: what a gyro drifts by in some minutes
-    implicit_sigma_m: float = 0.3  # a near neighbour predicted this well may be matched at once
-    commit_every_s: float = 0.5  # design section 7: at most a second is lost
-    paged_nodes: int = 1024  # nodes kept in memory with their edges, some 2 kB each
+    fresh_m: float = within(10.0, 0.5, 1000.0)
+    """Way after which a node's place in the window is measured again."""
+    align_again_m: float = within(0.3, 0.05, 10.0)  # a refused match is tried again after this way
+    align_widen: float = within(2.0, 1.0, 100.0)
+    """And its prediction believed that much less (variance), up to."""
+    align_widest_m: float = within(0.3, 0.01, 2.0)  # this standard deviation of its place
+    align_widest_rad: float = within(0.05, 0.005, 0.5)
+    """And of its heading: what a gyro drifts by in some minutes."""
+    implicit_sigma_m: float = within(0.3, 0.01, 2.0)
+    """A near neighbour predicted this well may be matched at once."""
+    commit_every_s: float = within(0.5, 0.05, 60.0)  # design section 7: at most a second is lost
+    paged_nodes: int = within(1024, 20, 1000000)  # nodes kept in memory with their edges, some 2 kB each
     durable: bool = True  # sync to disk with each commit; batch runs over a log need not
 
     def __post_init__(self) -> None:

@@ -318,6 +318,52 @@ def test_base_on_the_port_is_named_and_left_in_peace():
     assert not any(sent[5:])
 
 
+def listen(line, period_s=1.0, until_s=8.0):
+    """Return what a laser session says of somebody who prints one line a period, and what it sent last."""
+    session, told, sent = HokuyoSession(), [], []
+    for i in range(round(50 * until_s)):
+        now_s = 0.02 * i
+        data = line if line and i % round(50 * period_s) == 30 else b""
+        told += [(now_s, event) for event in session.receive(data, now_s)]
+        sent.append(session.tick(now_s))
+    return told, sent
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        (b"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\r\n", "NMEA"),
+        (b"temperature 21.5\r\n", "plain text"),
+    ],
+    ids=str,
+)
+def test_a_slow_stranger_is_named_by_what_it_said_and_no_cable_blamed(line, name):
+    told, sent = listen(line)
+    ((when_s, seen),) = [each for each in told if isinstance(each[1], WrongDeviceSeen)]
+    assert when_s < 4.0
+    assert f"not a laser but a device that speaks {name}" in seen.reason
+    assert repr(line[:5].decode())[:-1] in seen.reason
+    assert not [event for _, event in told if isinstance(event, LaserFault)]
+    assert not any(sent[-200:])
+
+
+def test_a_stranger_whose_lines_might_end_a_scan_is_named_after_some():
+    told, _ = listen(b"42\n")
+    (seen,) = [event for _, event in told if isinstance(event, WrongDeviceSeen)]
+    assert "a device that speaks plain text answers, it sent '42\\n42\\n42\\n" in seen.reason
+
+
+@pytest.mark.parametrize(
+    ("line", "period_s"),
+    [(b"", 1.0), (b"\xff\x00", 1.0), (b"0Ab0Ab0Ab\n0A2\n", 100.0)],
+    ids=["silence", "noise", "end of a scan"],
+)
+def test_without_a_stranger_a_laser_that_does_not_answer_is_a_matter_of_the_cable(line, period_s):
+    told, _ = listen(line, period_s)
+    assert not [event for _, event in told if isinstance(event, WrongDeviceSeen)]
+    assert any("check the cable" in event.reason for _, event in told if isinstance(event, LaserFault))
+
+
 def test_state_of_health_texts_of_the_field_are_known():
     for text in ("Sensor works well.", "sensor is working normally", "Stable 000 no error.", ""):
         assert is_healthy(text)

@@ -84,9 +84,46 @@ def test_every_contact_button_and_motor_flag_makes_one_event_for_each_change():
     assert [sample.contact for sample in of(events, KobukiSample)] == [False] * 3 + [True] * 3 + [False] * 3
 
 
-def test_a_stranger_is_an_unknown_device():
+def test_a_talkative_stranger_is_named_at_once():
     (seen,) = of(KobukiSession().receive(b"$GPRMC,081836,A,3751.65,S,14507.36,E" * 12, 0.0), WrongDeviceSeen)
-    assert "not a Kobuki base but an unknown device answers, it sent '$GPRMC,081836,A,3751.65," in seen.reason
+    assert "not a Kobuki base but a device that speaks NMEA (a GPS receiver?) answers, it sent" in seen.reason
+    assert "'$GPRMC,081836,A,3751.65," in seen.reason
+    (seen,) = of(KobukiSession().receive(bytes(range(128, 228)) * 4, 0.0), WrongDeviceSeen)
+    assert "an unknown device answers, it sent 80 81 82" in seen.reason
+
+
+def listen(line, period_s=1.0, until_s=6.0):
+    """Return what a base session says of somebody who prints one line a period, and when."""
+    session, told = KobukiSession(), []
+    for i in range(round(50 * until_s)):
+        now_s = 0.02 * i
+        data = line if line and i % round(50 * period_s) == 30 else b""
+        told += [(now_s, event) for event in session.receive(data, now_s)]
+        session.tick(now_s)
+    return told
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        (b"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\r\n", "NMEA"),
+        (b"temperature 21.5\r\n", "plain text"),
+        (b"42\n", "plain text"),
+    ],
+    ids=str,
+)
+def test_a_slow_stranger_is_named_after_a_few_seconds_by_what_it_said(line, name):
+    told = listen(line)
+    (when_s,) = [now_s for now_s, event in told if isinstance(event, WrongDeviceSeen)]
+    (reason,) = [event.reason for _, event in told if isinstance(event, WrongDeviceSeen)]
+    assert when_s < 4.0
+    assert name in reason
+    assert line[:10].decode().strip() in reason
+
+
+@pytest.mark.parametrize("line", [b"", b"\xff\x00\x81", b"\xfe\xf8ab\n\x80"], ids=str)
+def test_silence_and_a_little_noise_are_no_stranger(line):
+    assert not [event for _, event in listen(line) if isinstance(event, WrongDeviceSeen)]
 
 
 def test_versions_are_asked_for_until_they_come_and_gains_only_of_firmware_that_has_them():

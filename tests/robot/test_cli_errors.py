@@ -133,14 +133,22 @@ def test_a_port_that_another_program_holds_is_named(refused, tmp_path, terminals
     assert not list(tmp_path.iterdir())
 
 
-def test_another_device_on_the_port_is_named_by_what_it_sent(refused, tmp_path, terminals, monkeypatch):
+@pytest.mark.parametrize(
+    ("end", "period_s", "wrong"),
+    [(1, 0.02, "not a laser"), (1, 0.7, "not a laser"), (0, 0.7, "not a Kobuki base")],
+    ids=["on the laser's port", "slowly on the laser's port", "slowly on the base's port"],
+)
+def test_another_device_on_the_port_is_named_by_what_it_sent(
+    refused, tmp_path, terminals, monkeypatch, end, period_s, wrong
+):
     monkeypatch.setattr("robot.robot_run.warm_up", lambda *_: None)
-    (_, kobuki), (laser, hokuyo) = terminals
+    (_, kobuki), (_, hokuyo) = terminals
+    stranger, path = terminals[end]
     stop = threading.Event()
 
     def chat() -> None:
-        while not stop.wait(0.02):
-            os.write(laser, b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n")
+        while not stop.wait(period_s):
+            os.write(stranger, b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n")
 
     gps = threading.Thread(target=chat)
     gps.start()
@@ -149,7 +157,8 @@ def test_another_device_on_the_port_is_named_by_what_it_sent(refused, tmp_path, 
     finally:
         stop.set()
         gps.join()
-    assert "not a laser" in said
+    assert said.startswith(f"{path}: {wrong} but a device that speaks NMEA")
+    assert "$GPGGA" in said
     assert not list(tmp_path.iterdir())
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.hokuyo.events import LaserFault, LaserScan
+from drivers.hokuyo.events import LaserFault, LaserScan, WrongDeviceSeen
 from drivers.hokuyo.session import HokuyoSession
 from drivers.kobuki.events import BaseInfo, Compatibility, KobukiSample
 from drivers.kobuki.packets import Bumper, Version
@@ -75,6 +75,16 @@ def test_swapped_ports_are_named_by_what_answers():
     base, laser = told_by(swapped=True)
     assert any("laser" in line and "swapped" in line for line in bad(judge_base(base)))
     assert any("Kobuki" in line and "swapped" in line for line in bad(judge_laser(laser)))
+
+
+def test_a_stranger_is_named_and_no_swapped_ports_are_suspected():
+    stranger = WrongDeviceSeen(
+        "not a laser but a device that speaks NMEA (a GPS receiver?) answers, it sent '$GP'"
+    )
+    said = " ".join(bad(judge_laser([stranger])))
+    assert "speaks NMEA" in said
+    assert "is it the right port?" in said
+    assert "swapped" not in said
 
 
 def test_old_firmware_is_named(healthy):

@@ -33,6 +33,10 @@ class Stage:
     sent: list = field(default_factory=list)
     signals: list = field(default_factory=list)
     bumper: int = 0
+    maps: bool = True
+    """False: mapping hangs."""
+    plans: bool = True
+    """False: navigation hangs."""
 
     def __post_init__(self):
         self.simulator = Simulator(worlds.load("office"), seed=3, config=self.config)
@@ -53,6 +57,10 @@ class Stage:
             for device in self.base.lost + self.laser.lost:
                 self.step.lost(device)
             self.step.take(*told, self.now_s)
+            for timed in self.exchange.scans.drain() if self.maps else ():
+                self.exchange.mapped.put(timed.scan.stamp_s)
+            if self.plans:
+                self.exchange.cycle.put(self.now_s)
             if twist is not None:
                 self.step.teleop(twist, self.now_s)
             commands = self.step.command(self.now_s)
@@ -135,6 +143,33 @@ def test_an_empty_battery_stops_and_is_seen_and_heard():
     assert Light(2, Led.ORANGE) in stage.signals
     assert stage.signals.count(Play(Tune.RECHARGE)) == 1
     assert any("battery" in text for text in stage.said())
+    stage.simulator.close()
+
+
+@pytest.mark.parametrize(
+    ("part", "reason"), [("maps", Reason.MAPPING_HANGS), ("plans", Reason.NAVIGATION_HANGS)], ids=str
+)
+@pytest.mark.parametrize("twist", [Twist(0.25, 0.0), None], ids=["driven", "nobody wants anything"])
+def test_a_part_that_hangs_stops_the_robot_and_is_told_shown_and_heard_once(driving, part, reason, twist):
+    driving.drive(0.02, twist)
+    before, _ = len(driving.sent), driving.said()
+    setattr(driving, part, False)
+    driving.drive(2.0, twist)
+    sent = driving.sent[before:]
+    first = next(index for index, each in enumerate(sent) if each.reason is reason)
+    assert first * 0.02 <= 0.1 + 0.3  # the next scan comes, or is due, within 0.1 s
+    assert {(each.v_mps, each.w_radps, each.reason) for each in sent[first:]} == {(0.0, 0.0, reason)}
+    assert driving.said() == [f"stopped: {reason}"]
+    assert driving.signals.count(Play(Tune.ERROR)) == 1
+    assert driving.signals[-2:] == [Light(1, Led.RED), Play(Tune.ERROR)]
+    setattr(driving, part, True)
+    assert driving.drive(2.0, Twist(0.25, 0.0)).v_mps > 0.0
+    assert driving.said() == [f"no longer: {reason}"]
+
+
+def test_a_robot_whose_navigation_never_begins_says_so():
+    stage = Stage(plans=False)
+    assert stage.drive(1.0).reason is Reason.NAVIGATION_HANGS
     stage.simulator.close()
 
 

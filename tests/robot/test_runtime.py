@@ -22,6 +22,7 @@ from robot.onlooker import Onlooker
 from robot.recording import Recorder
 from robot.replay import replay_events
 from robot.runtime import Ports, Runtime
+from robot.safety import Reason
 from robot.sim_server import FakeHardware
 from robot.warmup import warm_up
 from sim import worlds
@@ -69,6 +70,44 @@ def test_a_crash_in_the_mapping_thread_stops_the_robot_and_is_told(tmp_path):
         with pytest.raises(ArithmeticError, match="on purpose"):
             runtime.run(Idle(), 20.0)
         runtime.core.close()
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(
+    ("part", "reason"),
+    [("mapping", Reason.MAPPING_HANGS), ("navigation", Reason.NAVIGATION_HANGS)],
+    ids=str,
+)
+def test_a_thread_that_hangs_while_the_robot_drives_stops_it_with_the_reason(tmp_path, part, reason):
+    warm_up(RobotConfig())
+    hangs, released, sent = threading.Event(), threading.Event(), []
+    with FakeHardware("office", 2) as hardware:
+        runtime = runtime_on(hardware, tmp_path)
+        core = runtime.core
+        step, command = getattr(core, part).step, core.command
+
+        def hang(argument):
+            if sent and sent[-1].v_mps > 0.1:
+                hangs.set()
+                released.wait(20.0)
+            step(argument)
+
+        def watched(now_s):
+            commands = command(now_s)
+            sent.append(commands.drive)
+            if [each.reason for each in sent[-25:]] == [reason] * 25:  # half a second, and no end to it
+                runtime.stop.set()
+                released.set()
+            return commands
+
+        getattr(core, part).step = hang
+        core.command = watched
+        runtime.run(parse_mission("explore"), 30.0)
+        core.close()
+    assert hangs.is_set()
+    stopped = [(each.v_mps, each.w_radps) for each in sent if each.reason is reason]
+    assert len(stopped) >= 25
+    assert set(stopped) == {(0.0, 0.0)}
 
 
 @pytest.mark.realtime

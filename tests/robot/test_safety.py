@@ -1,13 +1,17 @@
 """One table of cases: what happens in each situation, at each side of each limit."""
 
+import dataclasses
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from lemtomap.errors import BadSetting
+from lemtomap.settings import range_of
 from robot.proximity import free_travel_m
 from robot.safety import Allowed, Evidence, Reason, SafetyGate, SafetyLimits, Sides
+from robot.velocity import SmootherConfig
 
 NOW = 100.0
 LIM = SafetyLimits()
@@ -16,8 +20,15 @@ SIDES = [Sides(left=True), Sides(centre=True), Sides(right=True)]
 
 def evidence(**changes):
     """Everything fresh and well, nothing near."""
-    good = Evidence(velocity_stamp_s=NOW, base_stamp_s=NOW, scan_stamp_s=NOW, valid_beams=600)
-    return replace(good, **changes)
+    return replace(fresh(NOW), **changes)
+
+
+def fresh(now_s):
+    """All that has a stamp came just now."""
+    stamps = dict.fromkeys(
+        ("velocity_stamp_s", "base_stamp_s", "map_stamp_s", "cycle_stamp_s", "scan_stamp_s"), now_s
+    )
+    return Evidence(**stamps, valid_beams=600)
 
 
 def gate():
@@ -40,6 +51,15 @@ STOPS = [
     ("wheel drop", (0.0, 0.0), {"wheel_drop": True}, Reason.WHEEL_DROP),
     ("over-current", (0.0, 0.0), {"over_current": True}, Reason.OVER_CURRENT),
     ("charging cable", (-0.1, 0.0), {"adapter": True}, Reason.ADAPTER),
+    ("map just too old", (0.3, 0.0), {"map_stamp_s": NOW - 0.2501}, Reason.MAPPING_HANGS),
+    ("map too old while standing", (0.0, 0.0), {"map_stamp_s": NOW - 0.2501}, Reason.MAPPING_HANGS),
+    ("cycle just too old", (0.3, 0.0), {"cycle_stamp_s": NOW - 0.2501}, Reason.NAVIGATION_HANGS),
+    (
+        "navigation hangs, so nobody wants anything",
+        (0.0, 0.0),
+        {"cycle_stamp_s": NOW - 0.2501, "velocity_stamp_s": -math.inf},
+        Reason.NAVIGATION_HANGS,
+    ),
     ("velocity just too old", (0.3, 0.0), {"velocity_stamp_s": NOW - 0.3001}, Reason.VELOCITY_SILENT),
     ("velocity never given", (0.0, 0.0), {"velocity_stamp_s": -math.inf}, Reason.VELOCITY_SILENT),
     ("scan just too old", (0.3, 0.0), {"scan_stamp_s": NOW - 0.5001}, Reason.SCAN_SILENT),
@@ -52,6 +72,8 @@ PASSES = [
     ("base at its limit", (0.3, 0.0), {"base_stamp_s": NOW - 0.2 + 1e-9}),
     ("stamps a little early", (0.3, 0.0), {"base_stamp_s": NOW + 0.049, "scan_stamp_s": NOW + 0.049}),
     ("velocity at its limit", (0.3, 0.0), {"velocity_stamp_s": NOW - 0.3 + 1e-9}),
+    ("map at its limit", (0.3, 0.0), {"map_stamp_s": NOW - 0.25 + 1e-9}),
+    ("cycle at its limit", (0.3, 0.0), {"cycle_stamp_s": NOW - 0.25 + 1e-9}),
     ("scan at its limit", (0.3, 0.0), {"scan_stamp_s": NOW - 0.5 + 1e-9}),
     ("standing needs no scan", (0.0, 0.0), {"scan_stamp_s": -math.inf, "valid_beams": 0}),
     ("just enough beams", (0.3, 0.0), {"valid_beams": 10}),
@@ -120,7 +142,7 @@ def test_permission_starts_false_and_can_be_taken_back():
 def test_settles_after_a_serious_fault(fault):
     made = gate()
     made.check(0.3, 0.0, evidence(**fault), NOW)
-    later = evidence(base_stamp_s=NOW + 0.49, velocity_stamp_s=NOW + 0.49, scan_stamp_s=NOW + 0.49)
+    later = fresh(NOW + 0.49)
     assert made.check(0.3, 0.0, later, NOW + 0.499) == Allowed(0.0, 0.0, Reason.SETTLING)
     assert made.check(0.3, 0.0, later, NOW + 0.5) == Allowed(0.3, 0.0, Reason.CLEAR)
 
@@ -145,7 +167,7 @@ def test_battery_stops_only_after_its_hold_and_forgives_a_sag():
         (20.0, 13.2, Reason.CLEAR),
     ]:
         now = NOW + since_s
-        ev = evidence(battery_v=volt, base_stamp_s=now, velocity_stamp_s=now, scan_stamp_s=now)
+        ev = replace(fresh(now), battery_v=volt)
         assert made.check(0.3, 0.0, ev, now).reason is reason, since_s
 
 
@@ -231,3 +253,45 @@ def test_free_travel_without_points_or_motion_is_endless():
 def test_flags_of_two_moments_join():
     assert (Sides(left=True) | Sides(right=True)) == Sides(left=True, right=True)
     assert (Sides() | Sides(centre=True)) == Sides(centre=True)
+
+
+SAFE = {
+    "v_max_mps": (0.05, 0.65),
+    "reverse_max_mps": (0.02, 0.2),
+    "w_max_radps": (0.1, 1.92),
+    "back_off_mps": (0.02, 0.15),
+    "bumped_w_max_radps": (0.05, 1.0),
+    "velocity_age_s": (0.1, 0.5),
+    "base_age_s": (0.04, 0.5),
+    "scan_age_s": (0.15, 0.8),
+    "map_age_s": (0.15, 0.5),
+    "cycle_age_s": (0.15, 0.5),
+    "settle_s": (0.2, 10.0),
+    "battery_empty_v": (13.0, 15.0),
+    "battery_hold_s": (0.5, 30.0),
+    "scan_valid_beams": (5, 300),
+    "body_radius_m": (0.178, 0.5),
+    "side_margin_m": (0.005, 0.2),
+    "stop_gap_m": (0.01, 0.5),
+    "creep_share": (0.01, 0.2),
+    "brake_mps2": (0.1, 1.2),
+    "reaction_s": (0.1, 1.0),
+    "own_parts_m": (0.0, 0.17),
+}
+
+
+def test_what_the_gate_can_be_told_is_bounded_with_a_reason():
+    ranges = {field.name: range_of(field) for field in dataclasses.fields(SafetyLimits)}
+    assert {name: (each.low, each.high) for name, each in ranges.items()} == SAFE
+    assert all(each.why for each in ranges.values())
+
+
+@pytest.mark.parametrize("cls", [SafetyLimits, SmootherConfig])
+def test_the_bounds_of_safety_hold_for_programs_too(cls):
+    for field in dataclasses.fields(cls):
+        allowed = range_of(field)
+        step = 1 if isinstance(field.default, int) else 1e-9
+        for edge, beyond in ((allowed.low, allowed.low - step), (allowed.high, allowed.high + step)):
+            assert getattr(cls(**{field.name: edge}), field.name) == edge
+            with pytest.raises(BadSetting, match=f"{field.name} = .*must lie between"):
+                cls(**{field.name: beyond})

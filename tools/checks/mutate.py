@@ -29,7 +29,9 @@ from tools.checks.safety_mutants import MUTANTS as SAFETY_MUTANTS
 ROOT = Path(__file__).resolve().parent.parent.parent
 COPIED = ("drivers", "lemtomap", "robot", "sim", "tools", "tests", "pyproject.toml")
 MISSIONS = [f"tests/robot/test_{name}.py" for name in ("lost", "mission", "lockstep", "reactions")]
-SAFETY_TESTS = [["tests/robot/test_safety.py", "tests/robot/test_velocity.py"]]
+SAFETY_TESTS = [
+    ["tests/robot/test_safety.py", "tests/robot/test_velocity.py", "tests/robot/test_watchdog.py"]
+]
 LONGEST_S = 600.0  # of one round of tests: a mutant that never ends is noticed as well
 FAILED = 1  # pytest: some tests failed
 BROKEN = 2  # pytest: they could not even be imported, which is noticed too

@@ -4,7 +4,6 @@ import argparse
 import hashlib
 import os
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from lemtomap.grid import SLAMS, GrowingGmapping, RollingGmapping, SlamConfig, W
 from lemtomap.grid.motion import Uncertainty
 from lemtomap.grid.scan import ScanPreparer
 from lemtomap.types import Odometry, Scan
+from robot.child import python
 from tools.measuring import resident_mb
 from tools.slam.drives import GOOD, SICK, URG, Laser, drive
 from tools.slam.feeding import Pairs, feed
@@ -165,7 +165,7 @@ def fresh_process(threads: int, cache: str) -> tuple[float, str]:
     environment = {**os.environ, "NUMBA_NUM_THREADS": str(threads), "NUMBA_CACHE_DIR": cache}
     code = FRESH.format(world=WORLD)
     done = subprocess.run(  # noqa: S603
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+        python("-c", code), env=environment, capture_output=True, text=True, check=True
     )
     seconds, hashed = done.stdout.split()
     return float(seconds), hashed

@@ -4,7 +4,6 @@ import json
 import math
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from itertools import takewhile
@@ -15,6 +14,7 @@ import numpy as np
 
 from lemtomap.types import Odometry, Scan
 from robot.bridge import URG_SILENT_FREE_M, deskewed_sighting
+from robot.child import python
 from robot.logs import open_log
 from tools.thesis.frames import Begin, End, Frame, send
 from tools.thesis.parts import PartOptions
@@ -53,7 +53,7 @@ def map_drive(log: Path, system: System, seed: int, out: Path, until_s: float = 
     try:
         for name in system.parts:
             process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-m", "tools.thesis.part", name, text],
+                python("-m", "tools.thesis.part", name, text),
                 stdin=chain[-1].stdout if chain else subprocess.PIPE,
                 stdout=subprocess.DEVNULL if name == system.parts[-1] else subprocess.PIPE,
                 env=environment,

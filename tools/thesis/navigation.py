@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from robot.child import python
 from tools.thesis.published import TRAJECTORY_M
 
 CYCLE_S = 0.1  # of the control loop, in which the legs' speeds are written down
@@ -34,7 +34,7 @@ class Task:
     def run(self, out: Path) -> dict[str, Any]:
         """Let both navigators drive; return their legs."""
         out.mkdir(parents=True, exist_ok=True)
-        command = [sys.executable, "-m", "tools.bench_nav", "tasks", "--world", self.world]
+        command = python("-m", "tools.bench_nav", "tasks", "--world", self.world)
         more = ["--metres", str(self.metres), "--seeds", "1", "--out", str(out)]
         with (out / "told.txt").open("w") as told:
             subprocess.run([*command, *more], check=True, stdout=told)  # noqa: S603 - our own module

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, adjoint, between, wrap_angle
+from lemtomap.settings import within
 from lemtomap.topo.align import kernels
 from lemtomap.topo.graph import Covariance
 from lemtomap.topo.kernels import lines
@@ -22,25 +23,28 @@ from lemtomap.types import GridView
 class MatchConfig:
     """What a match must show to be believed."""
 
-    least_points: int = 40  # boundary points the window must know about
-    least_share: float = 0.3  # and the share of the place's points these must be
-    least_score: float = 0.6  # share of them that has a hit within `near_m`
-    near_m: float = 0.12  # two coding cells' half widths
-    occupied_from: int = 50  # occupancy of GridView that counts as a wall
-    gate_sigmas: float = 4.0  # from the prediction, Mahalanobis
-    sigma_m: float = 0.05  # scatter of boundary points about hits: half a coding cell
-    coarse_sigma_m: float = 0.15  # for the search: as wide as its step
-    usual_fit: float = (
-        0.9  # of what is seen, in the search; unseen ground speaks neither for a pose nor against
-    )
-    bend_m: float = 0.006  # no match is surer, however many points: windows and places are a little bent
-    bend_rad: float = 0.007
-    weak_axis: float = 0.06  # a direction with less of the strongest one's information tells nothing
-    points_per_look: float = 8.0  # neighbouring points err together; so many count as one
-    apart_m: float = 0.35  # poses further apart than this are rivals in the search
-    rival_share: float = 0.93  # a rival with this share of the best fit makes the search undecided
-    max_search_m: float = 1.0  # wider than this it is loop closing's business
-    max_search_rad: float = 0.25
+    least_points: int = within(40, 3, 1000)  # boundary points the window must know about
+    least_share: float = within(0.3, 0.01, 1.0)  # and the share of the place's points these must be
+    least_score: float = within(0.6, 0.1, 1.0)  # share of them that has a hit within `near_m`
+    near_m: float = within(0.12, 0.02, 0.4)  # two coding cells' half widths
+    occupied_from: int = within(50, 1, 100)  # occupancy of GridView that counts as a wall
+    gate_sigmas: float = within(4.0, 1.0, 20.0)  # from the prediction, Mahalanobis
+    sigma_m: float = within(0.05, 0.005, 0.5)  # scatter of boundary points about hits: half a coding cell
+    coarse_sigma_m: float = within(0.15, 0.01, 1.0)  # for the search: as wide as its step
+    usual_fit: float = within(0.9, 0.1, 1.0)
+    """Of what is seen, in the search; unseen ground speaks neither for a pose nor against."""
+    bend_m: float = within(0.006, 1e-4, 0.1)
+    """No match is surer, however many points: windows and places are a little bent."""
+    bend_rad: float = within(0.007, 1e-4, 0.1)
+    weak_axis: float = within(0.06, 0.0, 1.0)
+    """A direction with less of the strongest one's information tells nothing."""
+    points_per_look: float = within(8.0, 1.0, 100.0)
+    """Neighbouring points err together; so many count as one."""
+    apart_m: float = within(0.35, 0.05, 2.0)  # poses further apart than this are rivals in the search
+    rival_share: float = within(0.93, 0.1, 1.0)
+    """A rival with this share of the best fit makes the search undecided."""
+    max_search_m: float = within(1.0, 0.05, 2.0)  # wider than this it is loop closing's business
+    max_search_rad: float = within(0.25, 0.02, 1.6)
 
 
 @dataclass(frozen=True, slots=True)

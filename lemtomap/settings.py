@@ -1,0 +1,59 @@
+"""A number of the settings and the range in which it makes sense, declared in one place: beside its default.
+
+    own_parts_m: float = within(0.15, 0.0, 0.17, "further out it would be the world")
+
+Whoever reads settings from a file refuses what lies outside; documentation lists the ranges.
+"""
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from lemtomap.errors import BadSetting
+
+T = TypeVar("T")
+_KEY = "range"
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """What a number may be, both ends included."""
+
+    low: float
+    high: float
+    why: str = ""
+    """What goes wrong outside, where that is not plain."""
+
+    def __contains__(self, value: float) -> bool:
+        return self.low <= value <= self.high  # false for a NaN
+
+    def __str__(self) -> str:
+        why = f" ({self.why})" if self.why else ""
+        return f"between {self.low:g} and {self.high:g}{why}"
+
+
+def within(default: T, low: float, high: float, why: str = "") -> T:
+    """Return the dataclass field of a number with its default and its range; None may be a default, too."""
+    declared: T = field(default=default, metadata={_KEY: Range(low, high, why)})
+    return declared
+
+
+def range_of(declared: "dataclasses.Field[Any]") -> Range | None:
+    """Return the range of a field; None when it has none, for it is no number."""
+    found: Range | None = declared.metadata.get(_KEY)
+    return found
+
+
+def check_ranges(settings: Any) -> None:
+    """Refuse a dataclass with a number outside its range, however it was made. Raises BadSetting."""
+    for name, value, allowed in _numbers(settings):
+        if value not in allowed:
+            raise BadSetting(f"{name} = {value}: must lie {allowed}")
+
+
+def _numbers(settings: Any) -> Iterator[tuple[str, float, Range]]:
+    for declared in dataclasses.fields(settings):
+        allowed, value = range_of(declared), getattr(settings, declared.name)
+        if allowed is not None and value is not None:
+            yield declared.name, value, allowed
