@@ -64,6 +64,15 @@ def map_(
         float | None,
         typer.Option(metavar="M", help="usable range; at most half the window, which is also the default"),
     ] = None,
+    field_of_view: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEGREES",
+            min=1.0,
+            max=360.0,
+            help="what the laser of a CARMEN log covers; default: as the log says, else by the number of beams",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="same log and seed: same map, byte for byte")] = 0,
 ) -> None:
     """Make a map of a recorded log."""
@@ -71,7 +80,7 @@ def map_(
     from robot.progress import progress_bar
 
     kind = slam or (Slam.WINDOW if particles is None else Slam.ROLLING)
-    options = MapLogOptions(log, out, kind.value, particles, window, max_range, seed)
+    options = MapLogOptions(log, out, kind.value, particles, window, max_range, seed, field_of_view)
     try:
         with progress_bar(f"mapping {log.name}") as bar:
             told = map_log(options, bar)

@@ -27,7 +27,6 @@ from robot.progress import Bar, first_use
 PARTICLES = {"window": 1, "gmapping": 30}  # growing grid: what Grisetti et al. 2007 used on these logs
 BAR_PERIOD_S = 0.2
 PROFILE_ROWS = 200
-MOST_REMARKS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +40,13 @@ class MapLogOptions:
     window_m: float = 20.0
     max_range_m: float | None = None
     seed: int = 0
+    field_of_view_deg: float | None = None
+    """What the laser of a CARMEN log covers, whatever the log says."""
+
+    def open_log(self) -> Log:
+        """Return the log; raises BadLog, BadSetting."""
+        told = self.field_of_view_deg
+        return open_log(self.log, None if told is None else math.radians(told))
 
     def slam_config(self) -> SlamConfig:
         """Return the metric layer's settings; raises BadSetting when they cannot work."""
@@ -89,17 +95,15 @@ class _Timed:
 
 
 def map_log(options: MapLogOptions, bar: Bar) -> str:
-    """Map the log and leave its files in the folder; return the line that tells the user what came out.
+    """Map the log and leave its files in the folder; return the lines that tell the user what came out.
 
     Raises BadLog, BadSetting; then nothing is left behind.
     """
     begun_s, begun_cpu_s = time.perf_counter(), time.process_time()
     config = options.slam_config()
-    log = open_log(options.log)
-    for remark in log.remarks[:MOST_REMARKS]:
+    log = options.open_log()
+    for remark in log.remarks:
         bar.say(f"{log.path}: {remark}")
-    if len(log.remarks) > MOST_REMARKS:
-        bar.say(f"{log.path}: and {len(log.remarks) - MOST_REMARKS} more of that kind")
     read_cpu_s = time.process_time() - begun_cpu_s
     with outputs.staged(options.out) as stage:
         grid = SLAMS[options.slam](config, options.seed)
@@ -116,23 +120,31 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
         finally:
             topo.close()
         summary = _summary(options, config, drive, final)
+        if log.has_clock:
+            summary["log_s"] = _span_s(drive.stamps_s)
         summary["map_bytes"] = outputs.file_bytes(stage / "map.lemto")
         outputs.write_trajectory(stage / "trajectory.tum", final.stamps_s, final.T_map_base)
-        outputs.write_grid(stage, view.grid)
+        outputs.write_grid(stage, view.grid, final.T_map_grid)
         draw(stage / "overview.png", _overview(options, summary, drive, final, view))
         summary |= {
             "wall_s": time.perf_counter() - begun_s,
             "cpu_s": time.process_time() - begun_cpu_s,
             "cpu_by_part_s": {"read": read_cpu_s, "grid": drive.grid_cpu_s, "topo": drive.topo_cpu_s},
-            "realtime_factor": summary["log_s"] / (time.perf_counter() - begun_s),
             "peak_rss_mb": outputs.peak_rss_mb(),
             "profile": drive.profile,
         }
+        if log.has_clock:
+            summary["realtime_factor"] = summary["log_s"] / summary["wall_s"]
         outputs.write_summary(stage / "summary.json", summary)
+    return f"{_told(summary, options.out)}\n{outputs.told_of_grid(options.out, view.grid, final.T_map_grid)}"
+
+
+def _told(summary: dict[str, Any], out: Path) -> str:
+    """Return the line that tells the user what came out."""
+    rate = f" ({summary['realtime_factor']:,.0f}x real time)" if "realtime_factor" in summary else ""
     return (
-        f"{summary['scans']:,} scans, {summary['path_m']:,.0f} m, in {summary['wall_s']:.1f} s "
-        f"({summary['realtime_factor']:,.0f}x real time): {summary['nodes']} nodes, "
-        f"{summary['loop_closures']} loop closures. Look at {options.out / 'overview.png'}"
+        f"{summary['scans']:,} scans, {summary['path_m']:,.0f} m, in {summary['wall_s']:.1f} s{rate}: "
+        f"{summary['nodes']} nodes, {summary['loop_closures']} loop closures. Look at {out / 'overview.png'}"
     )
 
 
@@ -150,7 +162,8 @@ def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
         now_s = time.perf_counter()
         if now_s - shown_s > BAR_PERIOD_S:
             shown_s = now_s
-            bar.show(index / len(log), index, (scan.stamp_s - drive.stamps_s[0]) / (now_s - begun_s))
+            done_s = scan.stamp_s - drive.stamps_s[0]
+            bar.show(index / len(log), index, done_s / (now_s - begun_s) if log.has_clock else None)
         if index % stride == 0:
             topo_cpu_s = time.process_time() - begun_cpu_s - slam.cpu_s
             drive.profile.append((index / len(log), slam.cpu_s, topo_cpu_s, outputs.rss_mb()))
@@ -167,7 +180,6 @@ def _summary(options: MapLogOptions, config: SlamConfig, drive: _Drive, final: F
         "log": str(options.log),
         "scans": len(final.stamps_s),
         "updates": drive.updates,
-        "log_s": _span_s(drive.stamps_s),
         "path_m": final.path_m(),
         "nodes": len(final.T_map_node),
         "edges": edges,
@@ -182,9 +194,10 @@ def _overview(
     options: MapLogOptions, summary: dict[str, Any], drive: _Drive, final: FinalMap, view: MapView
 ) -> Overview:
     """Gather what the picture shows."""
+    took = f" in {summary['log_s'] / 60:.0f} min" if "log_s" in summary else ""
     facts = [
         f"scans       {summary['scans']:,} ({summary['updates']:,} into the grid)",
-        f"path        {summary['path_m']:,.0f} m in {summary['log_s'] / 60:.0f} min",
+        f"path        {summary['path_m']:,.0f} m{took}",
         f"nodes       {summary['nodes']:,}",
         *(f"edges       {count:,} {kind.replace('_', ' ')}" for kind, count in summary["edges"].items()),
         f"map file    {summary['map_bytes'] / 1000:,.0f} kB",

@@ -17,7 +17,7 @@ import psutil
 from numpy.typing import NDArray
 
 from lemtomap.errors import BadSetting
-from lemtomap.se2 import Pose
+from lemtomap.se2 import Pose, compose
 from lemtomap.types import GridView
 
 # Grey levels and thresholds of ROS map_server; 205 decodes to 0.19608, so a free_thresh above it
@@ -28,6 +28,12 @@ FREE_PERCENT, OCCUPIED_PERCENT = (
     25,
     65,
 )  # nav2_map_server, map_io.cpp: what a trinary save calls free, occupied
+
+
+GRID_COMMENT = (
+    "# The grid at the end of the drive. The origin (x, y in metres, yaw in radians) is the pose of the\n"
+    "# image's lower left corner in the frame of trajectory.tum; a program that ignores the yaw shows it turned.\n"
+)
 
 
 @contextmanager
@@ -84,18 +90,33 @@ def grey_levels(occupancy: NDArray[np.int8]) -> NDArray[np.uint8]:
     return np.flipud(grey)
 
 
-def write_grid(directory: Path, grid: GridView) -> None:
-    """Write grid.pgm and grid.yaml, readable by ROS map_server."""
+def write_grid(directory: Path, grid: GridView, T_map_grid: Pose) -> None:
+    """Write grid.pgm and grid.yaml, readable by ROS map_server.
+
+    T_map_grid: where the grid's own frame lies in that of trajectory.tum. The image keeps the grid's axes;
+    the origin in grid.yaml, the pose of its lower left corner, lays it over the trajectory.
+    """
     image = grey_levels(grid.occupancy)
     rows, cols = image.shape
-    x_m, y_m = grid.origin_m
+    x_m, y_m, yaw_rad = compose(T_map_grid, [*grid.origin_m, 0.0]).tolist()
     write_whole(directory / "grid.pgm", f"P5\n{cols} {rows}\n255\n".encode() + image.tobytes())
     text = (
-        "image: grid.pgm\nmode: trinary\n"
-        f"resolution: {grid.resolution_m:.6g}\norigin: [{x_m:.6f}, {y_m:.6f}, 0.0]\n"
+        f"{GRID_COMMENT}image: grid.pgm\nmode: trinary\n"
+        f"resolution: {grid.resolution_m:.6g}\norigin: [{x_m:.6f}, {y_m:.6f}, {yaw_rad:.6f}]\n"
         f"negate: 0\noccupied_thresh: {OCCUPIED_THRESHOLD}\nfree_thresh: {FREE_THRESHOLD}\n"
     )
     write_whole(directory / "grid.yaml", text.encode())
+
+
+def told_of_grid(directory: Path, grid: GridView, T_map_grid: Pose) -> str:
+    """Return a line that tells the user what the grid shows, and in which frame."""
+    rows, cols = grid.occupancy.shape
+    width_m, height_m = cols * grid.resolution_m, rows * grid.resolution_m
+    turned_deg = math.degrees(float(T_map_grid[2]))
+    return (
+        f"{directory / 'grid.yaml'}: the grid at the end, {width_m:.0f} m x {height_m:.0f} m; its origin, "
+        f"turned by {turned_deg:.1f} degrees, lays it into the frame of trajectory.tum"
+    )
 
 
 def write_summary(path: Path, summary: Mapping[str, Any]) -> None:

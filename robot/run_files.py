@@ -109,7 +109,7 @@ class RunFiles(Onlooker):
     def _write(self, summary: Mapping[str, Any], final: FinalMap, view: MapView) -> None:
         """Write trajectory, grid and picture."""
         outputs.write_trajectory(self._out / "trajectory.tum", final.stamps_s, final.T_map_base)
-        outputs.write_grid(self._out, view.grid)
+        outputs.write_grid(self._out, view.grid, final.T_map_grid)
         overview = Overview(
             T_map_node=final.T_map_node,
             edges=final.edges,

@@ -21,6 +21,9 @@ def told_after_run(out: Path, summary: Mapping[str, Any]) -> str:
         )
         lines.append(f"picture    {out / 'overview.png'}")
         lines.append(f"map        {out / 'map.lemto'}")
+        lines.append(
+            f"grid       {out / 'grid.yaml'}   (the window at the end, in the frame of trajectory.tum)"
+        )
     recording = out / "run.rrd"
     if has_display():
         lines.append(f"recording  {recording}   (again: lemtomap view {out})")

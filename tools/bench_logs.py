@@ -91,7 +91,9 @@ def draw(log: Path, runs: Sequence[LogRuns], path: Path) -> None:
         _, T_map_base = read_tum(run.out / "trajectory.tum")
         tracks.plot(T_map_base[:, 0], T_map_base[:, 1], color=colour, linewidth=0.7, label=each.layer)
         rows = np.array(told["profile"])
-        minutes = rows[:, 0] * told["log_s"] / 60
+        minutes = (
+            rows[:, 0] * told.get("log_s", np.nan) / 60
+        )  # a log without a clock has no time to draw over
         cpu.plot(minutes, rows[:, 1] + rows[:, 2], color=colour, label=each.layer)
         memory.plot(minutes, rows[:, 3], color=colour)
     tracks.set_aspect("equal")

@@ -1,13 +1,19 @@
-"""CARMEN logs: text, one message a line; only FLASER lines are used, with the odometry pose inside them.
+"""CARMEN logs: text, one message a line; laser lines are used, with the odometry pose inside them.
 
     FLASER n r1 .. rn  laser_x laser_y laser_theta  robot_x robot_y robot_theta  ipc_stamp host logger_stamp
+    ROBOTLASER1 type start fov resolution max_range accuracy remission  n r1 .. rn  m e1 .. em
+                laser_x laser_y laser_theta  robot_x robot_y robot_theta  tv rv forward side turn
+                ipc_stamp host logger_stamp
+    RAWLASER1   as ROBOTLASER1 up to em, then the stamps
+    ODOM x y theta tv rv acceleration  ipc_stamp host logger_stamp
+    PARAM name value
 
-The lines have no angles: n beams cover 180 degrees from right to left.
+FLASER lines have no angles: PARAM lines or the number of beams tell them. RAWLASER1 lines have no pose: it
+comes from the ODOM lines; they are used in a log that has no other laser lines.
 """
 
 import math
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,102 +22,201 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.errors import BadLog
-from lemtomap.types import Odometry, Scan
-from robot.logs.numbers import finite, readings
-from robot.logs.oddities import Record, oddities
+from lemtomap.se2 import Pose
+from robot.logs import numbers
+from robot.logs.fans import Fan, UnknownFan, fan_of_line, fan_over, fan_told
+from robot.logs.no_return import infer_no_return_m
+from robot.logs.numbers import BrokenLine
+from robot.logs.oddities import note_oddities
+from robot.logs.odometry import OdometryLines
+from robot.logs.records import Laser, Record, RecordedLog
+from robot.logs.remarks import Remarks
 
-TAIL_FIELDS = 9  # laser pose, robot pose, stamp, host, logger stamp
-PILE_WIDTH_M = (
-    0.12  # a SICK's no-return code scatters this far below its most frequent value (unit conversions)
-)
-PILE_BEAMS = 5  # a code comes from beams of many directions, a real surface at one distance does not
+FARTHEST_SEEN_M = 80.0
+POSED = ("FLASER", "ROBOTLASER1")  # lines with the odometry pose in them
+RAW = "RAWLASER1"
+STAMPS = 3  # fields at the end of every message: ipc_stamp host logger_stamp
+POSES = 6  # of laser and robot
+MOTION = 5  # of ROBOTLASER1: velocities and distances
+SHORTEST_MESSAGE = 10  # fields of an ODOM line
+CODE_ROUNDED_M = 0.005  # a reading of "no return" may be rounded below the maximum range
+BROKEN = "broken lines are skipped"
+ASK = "give it with --field-of-view DEGREES"
 
 
 @dataclass(frozen=True, slots=True)
-class _Record(Record):
-    T_base_laser: NDArray[np.float64]
+class _Beams:
+    """What all laser lines have: readings, and where in the line they end."""
+
+    fan: Fan
+    ranges_m: NDArray[np.float32]
+    max_range_m: float
+    end: int
 
 
-class CarmenLog:
-    """The laser lines of one CARMEN log; see robot.logs.Log."""
+class _Reader:
+    """What was read of a log so far."""
 
-    def __init__(self, path: Path, records: list[_Record]) -> None:
+    def __init__(self, path: Path, field_of_view_rad: float | None) -> None:
         self.path = path
-        self.no_return_m = infer_no_return_m([record.ranges_m for record in records])
-        self.remarks = oddities(records)
-        self._records = records
+        self.field_of_view_rad = field_of_view_rad
+        self.remarks = Remarks()
+        self.records: dict[str, list[Record]] = {kind: [] for kind in (*POSED, RAW)}
+        self.odometry = OdometryLines()
+        self.first_broken = ""
+        self._params: dict[str, float] = {}
+        self._lasers: dict[tuple[Fan, float], Laser] = {}
 
-    def __len__(self) -> int:
-        return len(self._records)
+    def take(self, place: int, line: str) -> None:
+        """Read one line; a broken one is noted."""
+        name = line[: line.find(" ")] if " " in line else line.strip()
+        try:
+            if name in self.records:
+                self.records[name].append(self._record(name, place, line.split()))
+            elif name == "ODOM" and not any(self.records[kind] for kind in POSED):
+                fields = line.split()
+                _refuse_other_length(name, fields, SHORTEST_MESSAGE)
+                self.odometry.add(numbers.stamp(fields[-STAMPS]), numbers.pose(fields[1:4]))
+            elif name == "PARAM":
+                self._set(line.split())
+        except BrokenLine as reason:
+            self.remarks.add(BROKEN, place, str(reason))
+            self.first_broken = self.first_broken or f":{place}: {reason}"
+        except UnknownFan as reason:
+            raise BadLog(f"{self.path}:{place}: {reason}: {ASK}") from None
 
-    def __iter__(self) -> Iterator[tuple[Odometry, Scan]]:
-        for record in self._records:
-            yield Odometry(record.stamp_s, record.T_odom_base), self._scan(record)
+    def kind(self) -> str:
+        """Return the kind of laser line the log is made of."""
+        posed = max(POSED, key=lambda kind: len(self.records[kind]))
+        return posed if self.records[posed] else RAW
 
-    def _scan(self, record: _Record) -> Scan:
-        count = len(record.ranges_m)
-        ranges_m = np.where(record.ranges_m >= self.no_return_m, np.float32(np.inf), record.ranges_m)
-        ranges_m[ranges_m <= 0.0] = np.nan
-        return Scan(
-            stamp_s=record.stamp_s,
-            ranges_m=ranges_m,
-            angle_min_rad=-math.pi / 2.0,
-            angle_step_rad=math.pi / (count - 1 if count % 2 else count),
-            range_max_m=min(self.no_return_m, 80.0),
-            T_base_laser=record.T_base_laser,
+    def _set(self, fields: list[str]) -> None:
+        """Keep a setting of the laser."""
+        if len(fields) > 2 and fields[1] in _SETTINGS:
+            self._params[fields[1]] = numbers.number(fields[2], _SETTINGS[fields[1]])
+
+    def _record(self, name: str, place: int, fields: list[str]) -> Record:
+        beams = self._flaser(fields) if name == "FLASER" else self._laser1(name, fields)
+        at = beams.end
+        if name == RAW:  # the pose follows when all odometry is known
+            robot, T_base_laser = se2.IDENTITY, self._mounting()
+        else:
+            laser, robot = numbers.pose(fields[at : at + 3]), numbers.pose(fields[at + 3 : at + POSES])
+            T_base_laser = se2.between(robot, laser)
+            at += POSES + (MOTION if name == "ROBOTLASER1" else 0)
+        return Record(
+            place=place,
+            stamp_s=numbers.stamp(fields[at]),
+            ranges_m=beams.ranges_m,
+            laser=self._laser(beams),
+            T_odom_base=robot,
+            T_base_laser=T_base_laser,
+            missing=int(np.isnan(beams.ranges_m).sum()),
         )
 
+    def _flaser(self, fields: list[str]) -> _Beams:
+        """Read the beams of `FLASER n r1 .. rn`."""
+        count = numbers.count(fields[1], 2) if len(fields) > 1 else 2
+        end = 2 + count
+        _refuse_other_length("FLASER", fields, end + POSES + STAMPS)
+        if self.field_of_view_rad is not None:
+            fan = fan_over(count, self.field_of_view_rad)
+        else:
+            told = self._told("laser_front_laser_fov"), self._told("laser_front_laser_resolution")
+            fan = fan_told(count, *told)
+        return _Beams(fan, numbers.readings(fields[2:end]).astype(np.float32), math.inf, end)
 
-def read(path: Path, lines: list[str]) -> CarmenLog:
-    """Read every FLASER line; raises BadLog at the first line that is damaged."""
-    _refuse_cut_end(path, lines)
-    records = [
-        _record(path, number, line) for number, line in enumerate(lines, start=1) if line.startswith("FLASER")
-    ]
-    if not records:
-        raise BadLog(f"{path}: no FLASER line in {len(lines)} lines: not a CARMEN log")
-    return CarmenLog(path, records)
+    def _laser1(self, name: str, fields: list[str]) -> _Beams:
+        """Read the beams of `NAME type start fov resolution max_range accuracy remission n r1 .. rn m ..`."""
+        _refuse_other_length(name, fields[:9], 9)
+        start_rad, fov_rad, step_rad, max_range_m = (numbers.number(text, 1e4) for text in fields[2:6])
+        count = numbers.count(fields[8], 2)
+        at = 9 + count
+        _refuse_other_length(name, fields[: at + 1], at + 1)
+        end = at + 1 + numbers.count(fields[at])
+        _refuse_other_length(name, fields, end + STAMPS + (0 if name == RAW else POSES + MOTION))
+        if self.field_of_view_rad is not None:
+            fan = fan_over(count, self.field_of_view_rad)
+        else:
+            fan = _fan_of_line(count, start_rad, fov_rad, step_rad)
+        ranges_m = numbers.readings(fields[9:at]).astype(np.float32)
+        return _Beams(fan, ranges_m, max_range_m if max_range_m > 0.0 else math.inf, end)
+
+    def _laser(self, beams: _Beams) -> Laser:
+        """Return the laser, one object for all scans with the same."""
+        key = beams.fan, beams.max_range_m
+        if key not in self._lasers:
+            self._lasers[key] = Laser(
+                angle_min_rad=beams.fan.angle_min_rad,
+                angle_step_rad=beams.fan.step_rad,
+                range_max_m=FARTHEST_SEEN_M,
+                no_return_m=beams.max_range_m - CODE_ROUNDED_M,
+            )
+        return self._lasers[key]
+
+    def _told(self, name: str) -> float | None:
+        """Return an angle of the settings; CARMEN's 0 says nothing."""
+        value = self._params.get(name, 0.0)
+        return value if value > 0.0 else None
+
+    def _mounting(self) -> Pose:
+        """Return T_base_laser as the settings tell it."""
+        ahead, aside, turned = (self._params.get(f"robot_frontlaser_{name}offset", 0.0) for name in _OFFSETS)
+        return se2.pose(ahead, aside, turned)
 
 
-def infer_no_return_m(scans: list[NDArray[np.float32]]) -> float:
-    """Return the reading from which on a beam saw nothing, metres; infinity when the log has no such code.
+_OFFSETS = ("", "side_", "angular_")
+_SETTINGS = {  # name: the largest value that makes sense
+    "laser_front_laser_fov": 361.0,
+    "laser_front_laser_resolution": 361.0,
+    **{f"robot_frontlaser_{name}offset": 100.0 for name in _OFFSETS},
+}
 
-    A laser writes a fixed code, its largest reading, for a beam that does not come back. The code shows as
-    a pile of equal readings at the top of the log that comes from many directions.
+
+def read(path: Path, lines: Iterable[tuple[int, str]], field_of_view_rad: float | None) -> RecordedLog:
+    """Read every laser line; those that are broken are skipped and noted.
+
+    field_of_view_rad: what the laser covers, whatever the log says. Raises BadLog when no scan is left, and
+    when nothing tells where the beams point.
     """
-    seen = (ranges[~np.isnan(ranges)] for ranges in scans)
-    largest_m = max((float(ranges.max()) for ranges in seen if len(ranges)), default=0.0)
-    counts: Counter[int] = Counter()
-    beams: dict[int, set[int]] = {}
-    for ranges in scans:
-        for beam in np.flatnonzero(ranges >= largest_m - 2.0 * PILE_WIDTH_M):
-            centimetres = round(100.0 * float(ranges[beam]))
-            counts[centimetres] += 1
-            beams.setdefault(centimetres, set()).add(int(beam))
-    pile, _ = counts.most_common(1)[0] if counts else (0, 0)
-    if len(beams.get(pile, ())) < PILE_BEAMS:
-        return math.inf
-    return max(pile / 100.0 - PILE_WIDTH_M / 2.0, 0.0)
+    reader = _Reader(path, field_of_view_rad)
+    place, line = 0, ""
+    for place, raw in lines:
+        line = raw.lstrip("\ufeff \t")
+        reader.take(place, line)
+    _note_cut_end(place, line, reader.remarks)
+    kind = reader.kind()
+    records = reader.records[kind]
+    if not records:
+        if reader.first_broken:
+            raise BadLog(f"{path}{reader.first_broken}; no line is left to map")
+        raise BadLog(f"{path}: no FLASER, ROBOTLASER1 or RAWLASER1 line in {place} lines: not a CARMEN log")
+    if kind == RAW:
+        records = reader.odometry.placed(path, records, reader.remarks)
+    for other in POSED:
+        if other != kind and reader.records[other]:
+            for record in reader.records[other]:
+                reader.remarks.add(f"{other} lines are left out", record.place, f"beside {kind}")
+    note_oddities(records, reader.remarks)
+    return RecordedLog(path, records, reader.remarks, infer_no_return_m(records))
 
 
-def _refuse_cut_end(path: Path, lines: list[str]) -> None:
-    """Raise BadLog when the last line has no end and is too short for any message of a robot."""
-    last = lines[-1]
-    if not last.endswith("\n") and not last.startswith("#") and len(last.split()) < TAIL_FIELDS + 1:
-        raise BadLog(f"{path}:{len(lines)}: the file is cut in the middle of this line")
+def _fan_of_line(beams: int, start_rad: float, fov_rad: float, step_rad: float) -> Fan:
+    """Return the fan of a line that tells it; raises BrokenLine where it contradicts itself."""
+    try:
+        return fan_of_line(beams, start_rad, fov_rad, step_rad)
+    except UnknownFan as reason:
+        raise BrokenLine(f"{reason}: {ASK}") from None
 
 
-def _record(path: Path, number: int, line: str) -> _Record:
-    fields = line.split()
-    (count,) = (int(value) for value in finite(path, number, fields[1:2])) if len(fields) > 1 else (0,)
-    if count < 2 or len(fields) < 2 + count + TAIL_FIELDS:
-        reason = (
-            f"FLASER promises {count} ranges and {TAIL_FIELDS} more fields, the line has {len(fields) - 2}"
-        )
-        raise BadLog(f"{path}:{number}: cut in the middle of the line? {reason}")
-    tail = fields[2 + count : 2 + count + TAIL_FIELDS]
-    ranges = np.array(readings(path, number, fields[2 : 2 + count]), dtype=np.float32)
-    numbers = finite(path, number, tail[:7])
-    laser, robot = np.array(numbers[:3]), np.array(numbers[3:6])
-    missing = int(np.isnan(ranges).sum())
-    return _Record(number, numbers[6], ranges, robot, missing, se2.between(robot, laser))
+def _refuse_other_length(name: str, fields: list[str], needed: int) -> None:
+    if len(fields) != needed:
+        raise BrokenLine(f"cut in the middle? {name} promises {needed} fields, the line has {len(fields)}")
+
+
+def _note_cut_end(place: int, last: str, remarks: Remarks) -> None:
+    """Note a last line that has no end and is too short for any message of a robot."""
+    name = last.split(" ", 1)[0]
+    spoken = last.startswith("#") or name in {"PARAM", "SYNC"} or name in {*POSED, RAW, "ODOM"}
+    if last.strip() and not last.endswith("\n") and not spoken and len(last.split()) < SHORTEST_MESSAGE:
+        remarks.add(BROKEN, place, "the file ends in the middle of it")

@@ -1,47 +1,33 @@
-"""What is odd in a log and does no harm to the rest of it, each with its line."""
+"""What is odd about scans that were read, seen from one to the next."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lemtomap import se2
+from robot.logs.records import Record
+from robot.logs.remarks import Remarks
 
 TELEPORT_M, TELEPORT_RAD = 1.0, 0.7  # more than a wheeled robot does between two scans
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One line of a log, read."""
-
-    line_number: int
-    stamp_s: float
-    ranges_m: NDArray[np.float32]
-    T_odom_base: NDArray[np.float64]
-    missing: int
-    """How many ranges of the line were no numbers."""
-
-
-def oddities(records: Sequence[Record]) -> list[str]:
-    """Return a remark for every oddity."""
-    remarks = [
-        f"line {record.line_number}: ranges that are no numbers ({record.missing}) count as no answer"
-        for record in records
-        if record.missing
-    ]
+def note_oddities(records: Sequence[Record], remarks: Remarks) -> None:
+    """Add a remark for every oddity."""
+    for record in records:
+        if record.missing:
+            remarks.add(
+                "ranges that are no numbers count as no answer", record.place, f"{record.missing} of them"
+            )
     for before, here in pairwise(records):
         if len(before.ranges_m) != len(here.ranges_m):
-            beams = f"{len(here.ranges_m)} beams after {len(before.ranges_m)}"
-            remarks.append(f"line {here.line_number}: {beams}")
+            beams = f"{len(here.ranges_m)} after {len(before.ranges_m)}"
+            remarks.add("the number of beams changes", here.place, beams)
         x, y, yaw = np.abs(se2.between(before.T_odom_base, here.T_odom_base))
         if math.hypot(x, y) > TELEPORT_M or yaw > TELEPORT_RAD:
-            leap = f"{math.hypot(x, y):.2f} m, {math.degrees(yaw):.0f} degrees"
-            remarks.append(f"line {here.line_number}: odometry leaps by {leap}")
-    back = [here.line_number for before, here in pairwise(records) if here.stamp_s < before.stamp_s]
-    if back:
-        more = f" and {len(back) - 1} more" if len(back) > 1 else ""
-        remarks.append(f"line {back[0]}{more}: the stamp goes back; lines are used in file order")
-    return remarks
+            leap = f"by {math.hypot(x, y):,.2f} m, {math.degrees(yaw):.0f} degrees"
+            remarks.add("the odometry leaps", here.place, leap)
+        if here.stamp_s < before.stamp_s:
+            back = f"by {before.stamp_s - here.stamp_s:,.3f} s"
+            remarks.add("the clock goes back, scans are used in file order", here.place, back)

@@ -1,83 +1,128 @@
 """tinySLAM logs (.dat): the rover of Steux and El Hamzaoui with a real URG-04LX, one line a scan.
 
-Column 0 is the time in microseconds, 2 and 3 the left and right wheel ticks, 24 to 705 the 682 ranges in mm;
-readings below 20 are the laser's error codes (hokuyo-scip: URG-04LX data below 20).
+Column 0 is the time in microseconds, 2 and 3 the left and right wheel ticks, then come other sensors and the
+682 ranges in mm; readings below 20 are the laser's error codes (hokuyo-scip: URG-04LX data below 20). There
+are two layouts, told apart by their width.
 """
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap import se2
-from lemtomap.errors import BadLog
-from lemtomap.types import Odometry, Scan
-from robot.logs.numbers import finite, readings
-from robot.logs.oddities import Record, oddities
+from lemtomap.errors import BadLog, BadSetting
+from robot.logs import numbers
+from robot.logs.numbers import BrokenLine
+from robot.logs.oddities import note_oddities
+from robot.logs.records import Laser, Record, RecordedLog
+from robot.logs.remarks import Remarks
 
-FIELDS = 706
-FIRST_RANGE, RANGES = 24, 682
+RANGES = 682
 WHEEL_RADIUS_M = 0.077
 HALF_AXLE_M = 0.165
-METRES_PER_TICK = WHEEL_RADIUS_M * math.pi / 2000.0
+METRES_PER_TICK = 2.0 * math.pi * WHEEL_RADIUS_M / 2000.0  # 2000 ticks for each turn of a wheel
+MOST_TICKS = 1e9
 LASER_AHEAD_M = 0.145
 FIRST_ERROR_FREE_MM = 20
-RANGE_MAX_M = 5.6
+LONGEST_MM = 1e6
 ANGLE_STEP_RAD = 2.0 * math.pi / 1024.0  # URG-04LX data sheet: 0.36 degrees
 TURN_S = 0.1  # URG-04LX data sheet: 100 ms a turn of 1024 steps
-ANGLE_MIN_RAD = -(RANGES - 1) / 2.0 * ANGLE_STEP_RAD
+URG_04LX = Laser(
+    angle_min_rad=-(RANGES - 1) / 2.0 * ANGLE_STEP_RAD,
+    angle_step_rad=ANGLE_STEP_RAD,
+    range_max_m=5.6,
+    time_step_s=TURN_S / 1024.0,
+)
+LINES_TO_JUDGE = 20
 
 
 @dataclass(frozen=True, slots=True)
-class _Record(Record):
-    v_mps: float
-    w_radps: float
-    """Mean velocity since the scan before; the rover drives up to 0.9 m/s, so a scan must be de-skewed."""
+class _Layout:
+    """Where things stand in a line."""
+
+    first_range: int
+    right_sign: int
+    """-1: the right wheel counts down when the rover drives ahead."""
+
+    @property
+    def fields(self) -> int:
+        return self.first_range + RANGES
 
 
-class TinySlamLog:
-    """The scans of one .dat log; see robot.logs.Log."""
-
-    def __init__(self, path: Path, records: list[_Record]) -> None:
-        self.path = path
-        self.remarks = oddities(records)
-        self._records = records
-
-    def __len__(self) -> int:
-        return len(self._records)
-
-    def __iter__(self) -> Iterator[tuple[Odometry, Scan]]:
-        for record in self._records:
-            yield Odometry(record.stamp_s, record.T_odom_base, record.v_mps, record.w_radps), _scan(record)
+_LAYOUTS = (_Layout(24, 1), _Layout(12, -1))  # the wider first: exp*.dat, test_lab*.dat
 
 
-def read(path: Path, lines: list[str]) -> TinySlamLog:
-    """Read every line; raises BadLog at the first that is damaged."""
-    records: list[_Record] = []
-    ticks_before: tuple[float, float] | None = None
-    T_odom_base, step = se2.pose(0.0, 0.0, 0.0), se2.pose(0.0, 0.0, 0.0)
-    for number, line in enumerate(lines, start=1):
-        fields = line.split()
-        if not fields:
-            continue
-        if len(fields) < FIELDS:
-            raise BadLog(f"{path}:{number}: cut in the middle of the line? {len(fields)} fields of {FIELDS}")
-        stamp_s = finite(path, number, fields[:1])[0] / 1e6
-        left, right = finite(path, number, fields[2:4])
-        millimetres = np.array(readings(path, number, fields[FIRST_RANGE : FIRST_RANGE + RANGES]))
-        if ticks_before is not None:
-            step = _wheel_step(left - ticks_before[0], right - ticks_before[1])
-            T_odom_base = se2.compose(T_odom_base, step)
-        ticks_before = (left, right)
-        since_s = max(stamp_s - records[-1].stamp_s, TURN_S / 2.0) if records else TURN_S
-        ranges = np.where(millimetres < FIRST_ERROR_FREE_MM, np.nan, millimetres / 1000.0).astype(np.float32)
-        v_mps, w_radps = float(step[0]) / since_s, float(step[2]) / since_s
-        missing = int(np.isnan(millimetres).sum())
-        records.append(_Record(number, stamp_s, ranges, T_odom_base, missing, v_mps, w_radps))
-    return TinySlamLog(path, records)
+def read(path: Path, lines: Iterable[tuple[int, str]], field_of_view_rad: float | None) -> RecordedLog:
+    """Read every line; those that are broken are skipped and noted. Raises BadLog when no scan is left."""
+    if field_of_view_rad is not None:
+        raise BadSetting(f"{path}: the laser of a tinySLAM log is known: --field-of-view is for CARMEN logs")
+    pairs = ((place, line.split()) for place, line in lines)
+    rows = ((place, fields) for place, fields in pairs if fields)
+    first = list(islice(rows, LINES_TO_JUDGE))
+    layout = _layout([len(fields) for _, fields in first])
+    rover, remarks, reason = _Rover(layout), Remarks(), ""
+    for place, fields in chain(first, rows):
+        try:
+            rover.take(place, fields)
+        except BrokenLine as broken:
+            remarks.add("broken lines are skipped", place, str(broken))
+            reason = reason or f":{place}: {broken}"
+    if not rover.records:
+        raise BadLog(f"{path}{reason}; no line is left to map")
+    note_oddities(rover.records, remarks)
+    return RecordedLog(path, rover.records, remarks)
+
+
+def _layout(widths: list[int]) -> _Layout:
+    """Return the layout of most of the lines."""
+    fitting = Counter(
+        next((layout for layout in _LAYOUTS if width >= layout.fields), _LAYOUTS[0]) for width in widths
+    )
+    return fitting.most_common(1)[0][0] if fitting else _LAYOUTS[0]
+
+
+class _Rover:
+    """The rover's drive, line by line."""
+
+    def __init__(self, layout: _Layout) -> None:
+        self.records: list[Record] = []
+        self._layout = layout
+        self._ticks: tuple[float, float] | None = None
+        self._T_odom_base = se2.pose(0.0, 0.0, 0.0)
+
+    def take(self, place: int, fields: list[str]) -> None:
+        """Read one line; raises BrokenLine, then it changes nothing."""
+        first, end = self._layout.first_range, self._layout.fields
+        if len(fields) < end:
+            raise BrokenLine(f"cut in the middle? {len(fields)} fields of {end}")
+        stamp_s = numbers.number(fields[0], 1e6 * numbers.LATEST_S) / 1e6
+        left = numbers.number(fields[2], MOST_TICKS)
+        right = self._layout.right_sign * numbers.number(fields[3], MOST_TICKS)
+        millimetres = numbers.readings(fields[first:end], LONGEST_MM)
+        before = self._ticks if self._ticks is not None else (left, right)
+        step = _wheel_step(left - before[0], right - before[1])
+        self._ticks, self._T_odom_base = (left, right), se2.compose(self._T_odom_base, step)
+        since_s = max(stamp_s - self.records[-1].stamp_s, TURN_S / 2.0) if self.records else TURN_S
+        ranges_m = np.where(millimetres < FIRST_ERROR_FREE_MM, np.nan, millimetres / 1000.0)
+        self.records.append(
+            Record(
+                place=place,
+                stamp_s=stamp_s,
+                ranges_m=ranges_m.astype(np.float32),
+                laser=URG_04LX,
+                T_odom_base=self._T_odom_base,
+                T_base_laser=se2.pose(LASER_AHEAD_M, 0.0, 0.0),
+                v_mps=float(step[0]) / since_s,  # up to 0.9 m/s: a scan must be de-skewed
+                w_radps=float(step[2]) / since_s,
+                missing=int(np.isnan(millimetres).sum()),
+            )
+        )
 
 
 def _wheel_step(left_ticks: float, right_ticks: float) -> NDArray[np.float64]:
@@ -86,15 +131,3 @@ def _wheel_step(left_ticks: float, right_ticks: float) -> NDArray[np.float64]:
     turn = (right_m - left_m) / (2.0 * HALF_AXLE_M)
     forward = (left_m + right_m) / 2.0 * float(np.sinc(turn / (2.0 * math.pi)))
     return se2.pose(forward * math.cos(turn / 2.0), forward * math.sin(turn / 2.0), turn)
-
-
-def _scan(record: _Record) -> Scan:
-    return Scan(
-        stamp_s=record.stamp_s,
-        ranges_m=record.ranges_m,
-        angle_min_rad=ANGLE_MIN_RAD,
-        angle_step_rad=ANGLE_STEP_RAD,
-        time_step_s=TURN_S / 1024.0,
-        range_max_m=RANGE_MAX_M,
-        T_base_laser=se2.pose(LASER_AHEAD_M, 0.0, 0.0),
-    )

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -71,8 +72,8 @@ def _draw_graph(axes: Any, folder: Path, T_world_map: Pose) -> None:
 
 def _draw_grid(axes: Any, folder: Path, T_world_map: Pose) -> None:
     grey = np.flipud(np.asarray(Image.open(folder / "grid.pgm")))
-    lines = dict(line.split(": ", 1) for line in (folder / "grid.yaml").read_text().splitlines())
-    step, origin = float(lines["resolution"]), [float(v) for v in lines["origin"].strip("[]").split(",")[:2]]
+    told = yaml.safe_load((folder / "grid.yaml").read_text())
+    step, origin = float(told["resolution"]), told["origin"][:2]
     for value, colour, size in ((254, "#eeeeee", 1.0), (0, "#222222", 0.8)):
         rows, cols = np.nonzero(grey == value)
         if value == 254:  # the floor needs no more than every fourth cell

@@ -82,7 +82,7 @@ class MetricMapping(Part):
         """Write the grid map; tell its size."""
         self._track.close()
         if self.options.slam == "gmapping":
-            outputs.write_grid(self.options.out, self._slam.view())
+            outputs.write_grid(self.options.out, self._slam.view(), se2.IDENTITY)
             track = np.fromfile(self.options.out / "track.bin").reshape(-1, 3)
             np.save(self.options.out / "track.npy", track)
             return {"map_bytes": (self.options.out / "grid.pgm").stat().st_size}
