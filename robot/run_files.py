@@ -79,9 +79,10 @@ class RunFiles(Onlooker):
         self._scarce = ""
         self._space_lock = threading.Lock()
         core.mapping.mapper.store.before_commit = self._mind_space
-        recorder = Recorder(folder.path / "run.mcap", {"title": title})
+        super().__init__(core.exchange, core.efforts, say=listener.say)
+        self._recorder = Recorder(folder.path / "run.mcap", {"title": title})
         self._view = Viewer(folder.path / "run.rrd", lambda text: self.warn("viewer", text), live=live)
-        super().__init__(core.exchange, core.efforts, self._view, recorder, listener.say)
+        self._viewer = self._view
 
     def show_world(self, outlines: Sequence[NDArray[np.float64]], truth: Callable[[], Pose | None]) -> None:
         """Show a simulated building, and from now on where the robot truly is in it, T_world_base."""

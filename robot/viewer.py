@@ -93,8 +93,9 @@ class Viewer:
         batches = None if live else rr.ChunkBatcherConfig(flush_tick=self._config.flush_s)
         self._stream = rr.RecordingStream("lemtomap", make_default=False, batcher_config=batches)
         self._pipe = ViewerPipe(recording, say, ViewerWindow(say) if live else None)
-        self._stream.set_sinks(rr.FileSink(self._pipe.sink), default_blueprint=blueprint())
+        self._stream.set_sinks(rr.FileSink(self._pipe.sink))
         self._pipe.taken()
+        self._stream.send_blueprint(blueprint())
         self._log_static()
 
     def show_map(self, now_s: float, view: MapView) -> None:

@@ -45,7 +45,7 @@ class ViewerWindow:
         self._waiting.append(memoryview(data))
         try:
             self._write()
-        except BrokenPipeError:
+        except OSError:  # its end of the pipe is closed
             self._end("the live view was closed; the run goes on")
             return
         if sum(len(piece) for piece in self._waiting) > self._backlog_bytes:
