@@ -39,12 +39,14 @@ def staged(out: Path) -> Iterator[Path]:
     """
     if out.exists() and not out.is_dir():
         raise BadSetting(f"{out}: is a file; --out needs a directory")
-    folder = RunFolder(out) if out.exists() else None
+    claimed = RunFolder(out) if out.exists() else None
     missing = [folder for folder in (out.parent, *out.parent.parents) if not folder.exists()]
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     except OSError as error:
+        if claimed is not None:
+            claimed.close()
         raise BadSetting(f"{out}: cannot write there ({error.strerror})") from error
     try:
         yield stage
@@ -52,8 +54,8 @@ def staged(out: Path) -> Iterator[Path]:
         for file in sorted(stage.iterdir()):
             file.replace(out / file.name)
     finally:
-        if folder is not None:
-            folder.close()
+        if claimed is not None:
+            claimed.close()
         shutil.rmtree(stage, ignore_errors=True)
         with suppress(OSError):  # not empty: something of value stands there
             for folder in missing:

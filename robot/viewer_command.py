@@ -7,6 +7,7 @@ import sys
 from contextlib import suppress
 
 LOOPBACK = "127.0.0.1"
+RERUN = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"  # `-m rerun_cli` forgets the code
 GRACE_S = 1.0  # to close by itself
 
 Process = subprocess.Popen[bytes]
@@ -19,7 +20,7 @@ def start_viewer(*options: str, stdin: int | None = None, quiet: bool = False) -
     Raises OSError when it cannot be started.
     """
     said = subprocess.DEVNULL if quiet else None
-    command = [sys.executable, "-P", "-m", "rerun_cli", "--bind", LOOPBACK, *options]
+    command = [sys.executable, "-P", "-c", RERUN, "--bind", LOOPBACK, *options]
     return subprocess.Popen(  # noqa: S603 - our own interpreter and options
         command, stdin=stdin, stdout=said, stderr=said, start_new_session=True
     )

@@ -46,7 +46,9 @@ class ViewerWindow:
         try:
             self._write()
         except OSError:  # its end of the pipe is closed
-            self._end("the live view was closed; the run goes on")
+            code = self._process.poll()
+            how = f"ended with code {code}" if code is not None and code > 0 else "was closed"
+            self._end(f"the live view {how}; the run goes on")
             return
         if sum(len(piece) for piece in self._waiting) > self._backlog_bytes:
             self._end("the live view takes nothing any more and is closed; the run goes on")

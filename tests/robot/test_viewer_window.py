@@ -11,16 +11,18 @@ import time
 import psutil
 import pytest
 
+from robot.cli import main
 from robot.progress import LeftColumn, ShareColumn, progress_bar
 from robot.view import free_ports, where_to_look
+from robot.viewer_command import start_viewer
 from robot.viewer_window import ViewerWindow
 
 STAND_IN = f"""#!{sys.executable}
 import os, pathlib, sys, time
 pathlib.Path(os.environ["STAND_IN_LOG"]).write_text(f"{{os.getpid()}} {{' '.join(sys.argv[1:])}}\\n")
 while os.environ.get("STAND_IN") != "deaf" and os.read(0, 65536):
-    if os.environ.get("STAND_IN") == "brief":
-        sys.exit(0)
+    if os.environ.get("STAND_IN", "").isdigit():
+        sys.exit(int(os.environ["STAND_IN"]))
 time.sleep(60)
 """
 
@@ -78,13 +80,33 @@ def test_a_frozen_window_is_given_up_without_waiting_and_ended(stand_in, monkeyp
     wait_for(lambda: not alive(pid))
 
 
-def test_a_window_that_somebody_closed_is_told_once(stand_in, monkeypatch):
-    monkeypatch.setenv("STAND_IN", "brief")
+@pytest.mark.parametrize(("code", "how"), [(0, "was closed"), (3, "ended with code 3")])
+def test_a_window_that_goes_is_told_once(stand_in, monkeypatch, code, how):
+    monkeypatch.setenv("STAND_IN", str(code))
     said = []
     window = ViewerWindow(said.append)
-    wait_for(lambda: window.put(b"x") or said)
     window.put(b"x")
-    assert said == ["the live view was closed; the run goes on"]
+    wait_for(lambda: window._process.poll() is not None)
+    window.put(b"x")
+    window.put(b"x")
+    assert said == [f"the live view {how}; the run goes on"]
+
+
+def test_a_viewer_that_fails_ends_the_command_with_its_code(tmp_path, stand_in, monkeypatch, capsys):
+    monkeypatch.setenv("STAND_IN", "3")
+    monkeypatch.setenv("DISPLAY", ":97")
+    (tmp_path / "run.rrd").write_bytes(b"RRF2")
+    monkeypatch.setattr("robot.view.start_viewer", with_input)
+    assert main(["view", str(tmp_path)]) == 2
+    assert "the Rerun viewer ended with code 3" in capsys.readouterr().err
+
+
+def with_input(*options, **_):
+    """Start the stand-in with a byte to read."""
+    viewer = start_viewer(*options, stdin=subprocess.PIPE)
+    viewer.stdin.write(b"x")
+    viewer.stdin.close()
+    return viewer
 
 
 def test_ports_that_somebody_has_are_left_alone_and_the_link_names_those_that_are_served():
