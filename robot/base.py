@@ -30,6 +30,7 @@ from robot.reflex import Retreat
 from robot.safety import Allowed, Evidence, Reason, SafetyGate, Sides
 from robot.velocity import DOCKING, NAVIGATION, SAFETY, TELEOP, VelocityMux, VelocitySmoother, Wish
 from robot.watchdog import Watchdog
+from robot.wire import HOKUYO, KOBUKI
 
 SCAN_PATIENCE_S = 0.3  # a scan whose odometry has not come by then belongs to a silent base
 
@@ -59,6 +60,8 @@ class BaseStep:
         self._last: Odometry | None = None
         self._scan: TimedScan | None = None
         self._waiting: deque[LaserScan] = deque(maxlen=4)
+        self.heard: set[str] = set()
+        """Devices whose measurements have come: "kobuki", "hokuyo"."""
         self._bumped = self._fell = Sides()
         self._nav_version = 0
         self._commanded_s = -math.inf
@@ -76,6 +79,7 @@ class BaseStep:
                 self._take_event(event, now_s, lifted=hangs or self._hangs)
         for seen in laser:
             if isinstance(seen, LaserScan):
+                self.heard.add(HOKUYO)
                 self._waiting.append(seen)
             else:
                 self._tell(seen, now_s)
@@ -83,7 +87,7 @@ class BaseStep:
 
     def lost(self, device: str) -> None:
         """Take note that a device's port went away: it is silent from now on, not only after its time-out."""
-        if device == "kobuki":
+        if device == KOBUKI:
             self._sample = None
         else:
             self._scan = None
@@ -94,6 +98,7 @@ class BaseStep:
         self._mux.offer(TELEOP, twist, now_s)
 
     def _take_sample(self, sample: KobukiSample) -> None:
+        self.heard.add(KOBUKI)
         self._sample = sample
         self._last = self._odometry.update(
             sample.stamp_s, sample.left_ticks, sample.right_ticks, sample.gyro_yaw_rad, sample.gyro_rate_radps

@@ -16,6 +16,7 @@ from drivers.errors import DriverError
 from lemtomap.errors import LemtomapError
 from robot import cli_doctor, cli_drive, cli_file, cli_map
 from robot.cli_help import Interrupted
+from robot.interrupts import on_interrupt, raise_interrupt
 from sim.errors import SimError
 
 INTERRUPTED = 130  # as shells say it: 128 and SIGINT
@@ -66,11 +67,12 @@ cli_file.register(app)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; when it goes wrong the user reads one line, no traceback."""
     try:
-        result = app(
-            args=list(sys.argv[1:] if arguments is None else arguments),
-            prog_name="lemtomap",
-            standalone_mode=False,
-        )
+        with on_interrupt(raise_interrupt):
+            result = app(
+                args=list(sys.argv[1:] if arguments is None else arguments),
+                prog_name="lemtomap",
+                standalone_mode=False,
+            )
     except typer.TyperException as error:
         return _usage(error)
     except (LemtomapError, DriverError, SimError) as error:
@@ -102,6 +104,6 @@ def _usage(error: typer.TyperException) -> int:
 def _fail(code: int, text: str) -> int:
     """Write one line to stderr."""
     line = " ".join(text.split())
-    with contextlib.suppress(BrokenPipeError):
+    with contextlib.suppress(OSError):  # nobody reads any more
         sys.stderr.write(f"lemtomap: {line}\n")
     return code

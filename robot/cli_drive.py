@@ -125,7 +125,7 @@ def sim(
         return
     from robot.progress import progress_bar
     from robot.sim_run import SimOptions, run_sim
-    from robot.told import told_after_run
+    from robot.told import conclude
 
     options = SimOptions(
         world, mission, duration, out, seed, fast=fast, gui=gui, map_path=map_file, depth=depth
@@ -139,8 +139,7 @@ def sim(
         raise typer.Exit(summary["result"] == "failed")
     with progress_bar(f"sim {world}") as bar:
         summary = run_sim(options, bar)
-    typer.echo(told_after_run(out, summary))
-    raise typer.Exit(summary["result"] == "failed")
+    conclude(summary)
 
 
 def list_worlds(out: Path) -> str:
@@ -236,12 +235,12 @@ def replay(
     """Feed a recorded run's bytes through the same drivers and map it anew, as fast as the machine can."""
     from robot.progress import progress_bar
     from robot.replay_run import replay_run
-    from robot.told import told_after_run
+    from robot.told import conclude
 
     folder = out or Path("runs") / f"replay_{datetime.now(UTC).astimezone():%Y-%m-%d_%H-%M-%S}"
     with progress_bar("replay") as bar:
         summary = replay_run(recording, folder, bar, slam=slam, seed=seed)
-    typer.echo(told_after_run(folder, summary))
+    conclude(summary)
 
 
 def view(
@@ -254,17 +253,16 @@ def view(
     """Look at a recording in the Rerun viewer."""
     from robot.view import open_recording
 
-    open_recording(path, web=web)
+    open_recording(path, typer.echo, web=web)
 
 
 def _drive(name: str, options: object) -> None:
     """Run the real robot and tell what came of it."""
     from robot.progress import progress_bar
     from robot.robot_run import RobotOptions, run_robot
-    from robot.told import told_after_run
+    from robot.told import conclude
 
     assert isinstance(options, RobotOptions)  # noqa: S101 - typed loosely, so that the import stays in here
     with progress_bar(name) as bar:
-        folder, summary = run_robot(options, bar)
-    typer.echo(told_after_run(folder, summary))
-    raise typer.Exit(summary["result"] == "failed")
+        summary = run_robot(options, bar)
+    conclude(summary)

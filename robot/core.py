@@ -107,8 +107,10 @@ class RobotCore:
 
     def close(self) -> None:
         """Write the map and close its file."""
-        self.navigation.close()
-        self.mapping.close()
+        try:
+            self.navigation.close()
+        finally:
+            self.mapping.close()
 
 
 T = TypeVar("T")

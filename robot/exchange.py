@@ -96,6 +96,10 @@ class Ended:
     now_s: float
     state: MissionState
     text: str
+    interrupted: bool = False
+    """Somebody ended it: Ctrl-C, SIGTERM, a closed terminal."""
+    fault: str = ""
+    """What ended it beside the mission, such as a full disk."""
 
 
 class Exchange:

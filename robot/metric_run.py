@@ -18,6 +18,7 @@ from robot.lockstep import run_lockstep
 from robot.metric import build_metric_core
 from robot.missions import Moment, Order
 from robot.progress import Bar
+from robot.run import Teller
 from robot.sim_run import SimOptions, truth_of
 from sim import worlds
 from sim.simulator import Simulator
@@ -87,7 +88,7 @@ def run_metric(options: SimOptions, bar: Bar) -> dict[str, Any]:
             core,
             Points(points),
             options.duration_s,
-            watch=lambda now_s: bar.show(min(1.0, now_s / options.duration_s)),
+            watch=Teller(bar, options.duration_s).look,
         )
         summary = {
             "world": options.world,

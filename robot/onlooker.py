@@ -1,10 +1,12 @@
 """The part that only looks: the live viewer, the recorder and the lines the user reads.
 
 It reads mailboxes and may come too late for some of what lay in them; it counts that and slows nobody down.
-Only the raw bytes of the ports are queued for it, deep enough for minutes of a stalled disk.
+Only the raw bytes of the ports are queued for it, deep enough for minutes of a stalled disk. A recorder or a
+viewer that fails is left out from then on, which is said; the run goes on without.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import numpy as np
@@ -13,7 +15,8 @@ from lemtomap import se2
 from lemtomap.nav.types import NavOutput
 from lemtomap.types import MapView, Twist
 from robot.core import Efforts
-from robot.exchange import BaseStatus, Exchange, Note, TimedScan
+from robot.ending import reason_of
+from robot.exchange import BaseStatus, Exchange, Level, Note, TimedScan
 from robot.mailbox import BoundedQueue, Latest
 from robot.recording import Entry, Recorder
 from robot.viewer import Viewer
@@ -36,26 +39,55 @@ class Onlooker:
         self.raw: BoundedQueue[Entry] = BoundedQueue("bytes for the recorder", RAW_WAITING)
         self.skipped: dict[str, int] = {}
         """How many snapshots of each kind came and went between two looks."""
+        self.over = ""
+        """Why the run must end now; empty while it may go on."""
         self._exchange, self._efforts = exchange, efforts
         self._viewer, self._recorder, self._say = viewer, recorder, say
+        self.now_s = 0.0
+        """Time of the last look."""
         self._versions: dict[str, int] = {}
         self._node_poses: dict[int, se2.Pose] = {}
 
     def look(self, now_s: float) -> None:
         """Take everything that is new; call it about ten times a second."""
-        exchange = self._exchange
-        self._tell(exchange.notes.drain())
-        if self._recorder is not None:
-            for entry in self.raw.drain():
-                self._recorder.raw(entry)
+        exchange, self.now_s = self._exchange, now_s
+        notes, entries = exchange.notes.drain(), self.raw.drain()
         view = self._fresh("map", exchange.map_view)
         scan = self._fresh("scan", exchange.last_scan)
         output = self._fresh("navigation", exchange.nav_output)
         status = self._fresh("base", exchange.base_status)
+        for note in notes:
+            if self._say is not None:
+                self._say(note)
         if self._recorder is not None:
-            self._record(self._recorder, now_s, view, output, status)
+            try:
+                self._record(self._recorder, now_s, notes, entries, view, output, status)
+            except Exception as error:  # noqa: BLE001 - whatever it is, the robot drives on
+                self._end_recorder(f"{self._recorder.path} ends here: {reason_of(error)}")
         if self._viewer is not None:
-            self._show(self._viewer, now_s, view, scan, output, status)
+            try:
+                self._show(self._viewer, now_s, notes, view, scan, output, status)
+            except Exception as error:  # noqa: BLE001 - as above
+                self._viewer = None
+                self.warn("viewer", f"shows nothing any more: {reason_of(error)}")
+
+    def end_recordings(self, why: str) -> None:
+        """Write both recordings no further, for the reason given; the window goes on."""
+        if self._recorder is not None:
+            self._end_recorder(f"{self._recorder.path} ends here: {why}")
+        if self._viewer is not None:
+            self._viewer.end_file(why)
+
+    def _end_recorder(self, line: str) -> None:
+        recorder, self._recorder = self._recorder, None
+        self.warn("recorder", line)
+        with suppress(Exception):  # it may fail once more; what stands in the file stays readable
+            if recorder is not None:
+                recorder.close()
+
+    def warn(self, source: str, text: str) -> None:
+        """Leave a line for the user, from any thread."""
+        self._exchange.note(self.now_s, source, text, Level.WARN)
 
     def close(self) -> None:
         """Finish the recordings."""
@@ -72,25 +104,18 @@ class Onlooker:
         self.skipped[name] = self.skipped.get(name, 0) + version - seen - 1
         return box.get()
 
-    def _tell(self, notes: Sequence[Note]) -> None:
-        for note in notes:
-            if self._say is not None:
-                self._say(note)
-            if self._viewer is not None:
-                self._viewer.say(note.stamp_s, note.source, note.text, note.level)
-            if self._recorder is not None:
-                values = {"source": note.source, "level": note.level, "text": note.text}
-                self._recorder.derived("/log", note.stamp_s, values)
-
     def _show(
         self,
         viewer: Viewer,
         now_s: float,
+        notes: Sequence[Note],
         view: MapView | None,
         scan: TimedScan | None,
         output: NavOutput | None,
         status: BaseStatus | None,
     ) -> None:
+        for note in notes:
+            viewer.say(note.stamp_s, note.source, note.text, note.level)
         if view is not None:
             self._node_poses = dict(view.T_grid_node)
             viewer.show_map(now_s, view)
@@ -122,10 +147,17 @@ class Onlooker:
         self,
         recorder: Recorder,
         now_s: float,
+        notes: Sequence[Note],
+        entries: Sequence[Entry],
         view: MapView | None,
         output: NavOutput | None,
         status: BaseStatus | None,
     ) -> None:
+        for entry in entries:
+            recorder.raw(entry)
+        for note in notes:
+            values = {"source": note.source, "level": note.level, "text": note.text}
+            recorder.derived("/log", note.stamp_s, values)
         if view is not None:
             recorder.derived("/pose", view.stamp_s, _pose_values(view))
         if output is not None:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from lemtomap.errors import BadSetting
 from lemtomap.se2 import Pose, compose
 from lemtomap.types import GridView
+from robot.run_folder import RunFolder
 
 # Grey levels and thresholds of ROS map_server; 205 decodes to 0.19608, so a free_thresh above it
 # would turn unknown into free.
@@ -40,15 +41,18 @@ GRID_COMMENT = (
 def staged(out: Path) -> Iterator[Path]:
     """Give a private directory beside `out`; its files move into `out` only when the body ends well.
 
-    Raises BadSetting if `out` is no directory or cannot be made.
+    Raises BadSetting if `out` is no directory, cannot be made, or a run writes there.
     """
     if out.exists() and not out.is_dir():
         raise BadSetting(f"{out}: is a file; --out needs a directory")
+    claimed = RunFolder(out) if out.exists() else None
     missing = [folder for folder in (out.parent, *out.parent.parents) if not folder.exists()]
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     except OSError as error:
+        if claimed is not None:
+            claimed.close()
         raise BadSetting(f"{out}: cannot write there ({error.strerror})") from error
     try:
         yield stage
@@ -56,6 +60,8 @@ def staged(out: Path) -> Iterator[Path]:
         for file in sorted(stage.iterdir()):
             file.replace(out / file.name)
     finally:
+        if claimed is not None:
+            claimed.close()
         shutil.rmtree(stage, ignore_errors=True)
         with suppress(OSError):  # not empty: something of value stands there
             for folder in missing:

@@ -1,14 +1,19 @@
-"""A progress bar for long work: share, rate, speed against real time, time left; silent on no terminal."""
+"""A progress bar for long work: share, rate, speed against real time, time left; silent on no terminal.
+
+Work without an end shows the time since its begin. A terminal that is gone is no error.
+"""
 
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from datetime import timedelta
 
 from numba.core import event
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 COMPILING = "compiling for this machine: about a minute, this once"
 
@@ -21,16 +26,40 @@ class Bar:
     _task: TaskID
     _unit: str
 
-    def show(self, share: float, count: int = 0, speed: float | None = None) -> None:
-        """Move to `share` (0..1) with `count` units done; `speed` is how many times faster than real time."""
+    def show(self, share: float | None, count: int = 0, speed: float | None = None) -> None:
+        """Move to `share` (0..1; None: nobody knows the end) with `count` units done.
+
+        `speed` is how many times faster than real time.
+        """
         elapsed_s = self._progress.tasks[self._task].elapsed or 0.0
         rate = f"{count / elapsed_s:,.0f} {self._unit}/s" if count and elapsed_s > 0.5 else ""
         faster = f"{speed:.1f}x real time" if speed else ""
+        if share is None:
+            self._progress.tasks[self._task].total = None
         self._progress.update(self._task, completed=share, rate=rate, faster=faster)
 
     def say(self, text: str) -> None:
         """Print a line above the bar."""
-        self._progress.console.print(text, highlight=False, markup=False, soft_wrap=True)
+        with suppress(OSError):  # nobody reads any more
+            self._progress.console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+class ShareColumn(ProgressColumn):
+    """How much is done, or, where nobody knows the end, since when."""
+
+    def render(self, task: Task) -> Text:
+        """Return the text of this column."""
+        if task.total is None:
+            return Text(str(timedelta(seconds=int(task.elapsed or 0.0))))
+        return Text(f"{task.percentage:>3.0f} %")
+
+
+class LeftColumn(TimeRemainingColumn):
+    """How long it will take; nothing where nobody knows the end."""
+
+    def render(self, task: Task) -> Text:
+        """Return the text of this column."""
+        return Text("") if task.total is None else Text.assemble(super().render(task), " left")
 
 
 @contextmanager
@@ -76,11 +105,10 @@ def progress_bar(title: str, unit: str = "scans") -> Iterator[Bar]:
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=30),
-        TaskProgressColumn(),
+        ShareColumn(),
         TextColumn("{task.fields[rate]}"),
         TextColumn("{task.fields[faster]}"),
-        TimeRemainingColumn(compact=True),
-        TextColumn("left"),
+        LeftColumn(compact=True),
     )
     shown = sys.stderr.isatty()
     with Progress(

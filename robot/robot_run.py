@@ -43,8 +43,8 @@ class RobotOptions:
     """Drive by the keyboard, over whatever the mission wants."""
 
 
-def run_robot(options: RobotOptions, bar: Bar) -> tuple[Path, dict[str, Any]]:
-    """Run until the mission is over or somebody stops it; return the folder and the summary.
+def run_robot(options: RobotOptions, bar: Bar) -> dict[str, Any]:
+    """Run until the mission is over or somebody stops it; return the summary.
 
     Raises BadSetting, BadMap, PortError and WrongDevice before anything moves; then nothing is left behind.
     """
@@ -69,7 +69,7 @@ def run_robot(options: RobotOptions, bar: Bar) -> tuple[Path, dict[str, Any]]:
         runtime = Runtime(run.core, Ports(_opener(found.kobuki), _opener(found.hokuyo)), run.files)
         with _hands(options, runtime):
             run.end(runtime.run(mission, options.duration_s))
-    return out, run.summary
+    return run.summary
 
 
 def _hands(options: RobotOptions, runtime: Runtime) -> AbstractContextManager[None]:

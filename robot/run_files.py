@@ -1,8 +1,10 @@
 """Everything a run with a robot, real or simulated, leaves in its folder."""
 
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,17 +15,23 @@ from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, MapView
 from robot import outputs
 from robot.core import Effort, RobotCore
+from robot.ending import Ending, reason_of
 from robot.exchange import Note
 from robot.final_map import FinalMap, final_map
 from robot.onlooker import Onlooker
 from robot.overview import Overview, WallSketch, draw
 from robot.preview import draw_preview
 from robot.recording import Recorder
+from robot.run_folder import RunFolder, Space
 from robot.viewer import Viewer
 
 PREVIEW_PERIOD_S = 15.0
 WALLS_PERIOD_S = 0.5  # of the scans that draw the walls in the picture
+FOLDER_PERIOD_S = 1.0  # of wall time between two looks at the folder and its disk
 RESULTS = ("trajectory.tum", "grid.pgm", "grid.yaml", "overview.png", "summary.json", "run.rrd", "run.mcap")
+
+# What each step of the end may take, s; a drive of hours is solved in less.
+LOOK_LIMIT_S, CLOSE_LIMIT_S, WRITE_LIMIT_S, PICTURE_LIMIT_S, SOLVE_LIMIT_S = 5.0, 10.0, 20.0, 60.0, 180.0
 
 
 class Listener(Protocol):
@@ -47,17 +55,34 @@ class _Clock:
 
 
 class RunFiles(Onlooker):
-    """Recorder, viewer and, at the end, map, trajectory, picture and summary."""
+    """Recorder, viewer and, at the end, map, trajectory, picture and summary.
 
-    def __init__(self, out: Path, title: str, core: RobotCore, listener: Listener, *, live: bool) -> None:
-        self._out, self._title, self._core, self._listener = out, title, core, listener
+    Raises OSError when the recordings cannot be begun.
+    """
+
+    def __init__(
+        self,
+        folder: RunFolder,
+        spaces: Sequence[Space],
+        title: str,
+        core: RobotCore,
+        listener: Listener,
+        *,
+        live: bool,
+    ) -> None:
+        self._folder, self._spaces = folder, spaces
+        self._title, self._core, self._listener = title, core, listener
         self._begun = _Clock()
         self._walls = WallSketch()
-        self._walls_due_s, self._preview_due_s = 0.0, PREVIEW_PERIOD_S
+        self._walls_due_s, self._preview_due_s, self._folder_due_s = 0.0, PREVIEW_PERIOD_S, 0.0
         self._truth: Callable[[], Pose | None] | None = None
-        self._view = Viewer(out / "run.rrd", live=live)
-        recorder = Recorder(out / "run.mcap", {"title": title})
-        super().__init__(core.exchange, core.efforts, self._view, recorder, listener.say)
+        self._scarce = ""
+        self._space_lock = threading.Lock()
+        core.mapping.mapper.topo.store.before_commit = self._mind_space
+        super().__init__(core.exchange, core.efforts, say=listener.say)
+        self._recorder = Recorder(folder.path / "run.mcap", {"title": title})
+        self._view = Viewer(folder.path / "run.rrd", lambda text: self.warn("viewer", text), live=live)
+        self._viewer = self._view
 
     def show_world(self, outlines: Sequence[NDArray[np.float64]], truth: Callable[[], Pose | None]) -> None:
         """Show a simulated building, and from now on where the robot truly is in it, T_world_base."""
@@ -65,52 +90,131 @@ class RunFiles(Onlooker):
         self._view.show_world(outlines)
 
     def look(self, now_s: float) -> None:
-        """Show and record what is new; now and then keep a scan for the picture."""
+        """Show and record what is new; now and then keep a scan for the picture and look at the folder."""
+        self._mind_folder()
         super().look(now_s)
         self._listener.look(now_s)
         view, scan = self._core.exchange.map_view.get(), self._core.exchange.last_scan.get()
         true = self._truth() if self._truth is not None else None
-        if view is not None and true is not None:
+        if view is not None and true is not None and self._viewer is not None:
             self._view.show_truth(now_s, true, view.T_grid_base)
         if view is not None and now_s >= self._preview_due_s:
             self._preview_due_s = now_s + PREVIEW_PERIOD_S
-            draw_preview(self._out / "overview.png", view)
+            self._preview(view)
         if scan is not None and now_s >= self._walls_due_s:
             self._walls_due_s = now_s + WALLS_PERIOD_S
             self._walls.add(scan.scan.stamp_s, scan.sighting.hits_base)
 
+    def _preview(self, view: MapView) -> None:
+        """Draw the picture as far as it is; without room for it there is one at the end."""
+        try:
+            draw_preview(self._folder.path / "overview.png", view)
+        except OSError as error:
+            self._preview_due_s = float("inf")
+            self.warn("picture", f"none before the end: {reason_of(error)}")
+
+    # ---- the folder and its disk ----
+
+    def _mind_folder(self) -> None:
+        """Notice at once that the folder has gone, or that its disk gets full."""
+        wall_s = time.perf_counter()
+        if wall_s >= self._folder_due_s:
+            self._folder_due_s = wall_s + FOLDER_PERIOD_S
+            if not self._folder.here:
+                self._renew_folder()
+            self._mind_space()
+        if self._scarce:
+            self.end_recordings(self._scarce)
+            self._scarce = ""
+
+    def _renew_folder(self) -> None:
+        old, store = self._folder.path, self._core.mapping.mapper.topo.store
+        new = self._folder.renew()
+        if store.path.parent == old:
+            store.path = new / store.path.name
+        self.warn("folder", f"{old} is gone, deleted or moved; map and results will be in {new}")
+        self.end_recordings("its folder is gone")
+
+    def _mind_space(self) -> None:
+        """Keep what room is left for the map and the results. Called from the mapping thread, too."""
+        with self._space_lock:
+            for space in self._spaces:
+                try:
+                    free = space.free_bytes()
+                except OSError:  # the folder is gone, which is noticed elsewhere
+                    continue
+                if free < space.recordings_bytes and not space.scarce:
+                    space.scarce = True
+                    self._scarce = f"only {free / 1e6:.0f} MB are free on the disk, kept for map and results"
+                if free < space.least_bytes:
+                    space.release()
+                    self.over = self.over or f"{space.folder}: the disk is full"
+
+    # ---- the end ----
+
     def finish(
-        self,
-        now_s: float,
-        map_path: Path,
-        told: Mapping[str, Any],
-        settings: Mapping[str, Any],
-        *,
-        whole_drive: bool,
+        self, now_s: float, told: Mapping[str, Any], settings: Mapping[str, Any], *, whole_drive: bool
     ) -> dict[str, Any]:
         """Close everything, write the results, return the summary, which begins with `told`.
 
-        `whole_drive`: the map began empty with this run.
+        `whole_drive`: the map began empty with this run. Every step runs whatever becomes of the others; what
+        went wrong stands in the summary under "faults".
         """
-        self.look(now_s)
-        self.close()
-        view = self._core.exchange.map_view.get()
-        topo = self._core.mapping.mapper.topo
-        final = final_map(topo, whole_drive=whole_drive) if view is not None else None
-        self._core.close()
-        summary: dict[str, Any] = {**told, "run_s": now_s}
+        core, store = self._core, self._core.mapping.mapper.topo.store
+        ending = Ending(lambda line: self._listener.say(Note(now_s, "end", line)))
+        for space in self._spaces:
+            space.release()
+        ending.step("map", WRITE_LIMIT_S, store.commit)
+        ending.step("last look", LOOK_LIMIT_S, lambda: self.look(now_s))
+        if self._recorder is not None:
+            ending.step("recorder", CLOSE_LIMIT_S, self._recorder.close)
+        ending.step("viewer", CLOSE_LIMIT_S, self._view.close)
+        view = core.exchange.map_view.get()
+        final = self._final(ending, whole_drive=whole_drive) if view is not None else None
+        ending.step("folder", WRITE_LIMIT_S, self._need_folder)
+        ending.step("map", WRITE_LIMIT_S, core.close)
+        summary: dict[str, Any] = {**told, "run_s": now_s, "out": self._folder.path, "map": store.path}
         if final is not None and view is not None:
-            summary |= self._figures(final, now_s, map_path)
-            self._write(summary, final, view)
-        summary |= {**settings, "versions": outputs.versions()}
-        outputs.write_summary(self._out / "summary.json", summary)
+            summary |= self._figures(final, now_s, store.path)
+            self._write(ending, summary, final, view)
+        summary |= {"faults": [*told["faults"], *ending.failed], **settings, "versions": outputs.versions()}
+        write = lambda: outputs.write_summary(self._folder.path / "summary.json", summary)  # noqa: E731
+        ending.step("summary", WRITE_LIMIT_S, write)
+        summary["faults"] = [*told["faults"], *ending.failed]
+        self._folder.close()
         return summary
 
-    def _write(self, summary: Mapping[str, Any], final: FinalMap, view: MapView) -> None:
+    def _need_folder(self) -> None:
+        """See that there is a folder to write to."""
+        if not self._folder.here:
+            self._renew_folder()
+
+    def _final(self, ending: Ending, *, whole_drive: bool) -> FinalMap | None:
+        """Place the drive in one frame: fitted scan by scan, or, should that fail, node by node."""
+        mapper = self._core.mapping.mapper.topo
+        for whole in (True, False) if whole_drive else (False,):
+            final = ending.step("final map", SOLVE_LIMIT_S, partial(final_map, mapper, whole_drive=whole))
+            if final is not None:
+                return final
+        return None
+
+    def _write(self, ending: Ending, summary: Mapping[str, Any], final: FinalMap, view: MapView) -> None:
         """Write trajectory, grid and picture."""
-        outputs.write_trajectory(self._out / "trajectory.tum", final.stamps_s, final.T_map_base)
-        outputs.write_grid(self._out, view.grid, final.T_map_grid)
-        overview = Overview(
+        out = self._folder.path
+
+        def trajectory() -> None:
+            outputs.write_trajectory(out / "trajectory.tum", final.stamps_s, final.T_map_base)
+
+        def picture() -> None:
+            draw(out / "overview.png", self._overview(summary, final, view))
+
+        ending.step("trajectory", WRITE_LIMIT_S, trajectory)
+        ending.step("grid", WRITE_LIMIT_S, lambda: outputs.write_grid(out, view.grid, final.T_map_grid))
+        ending.step("picture", PICTURE_LIMIT_S, picture)
+
+    def _overview(self, summary: Mapping[str, Any], final: FinalMap, view: MapView) -> Overview:
+        """Gather what the picture shows."""
+        return Overview(
             T_map_node=final.T_map_node,
             edges=final.edges,
             trajectory=final.T_map_base,
@@ -121,7 +225,6 @@ class RunFiles(Onlooker):
             title=self._title,
             facts=_facts(summary),
         )
-        draw(self._out / "overview.png", overview)
 
     def _figures(self, final: FinalMap, now_s: float, map_path: Path) -> dict[str, Any]:
         """Return what the run did and cost."""

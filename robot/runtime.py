@@ -5,18 +5,18 @@
     navigation      10 times a second
     onlooker        viewer and recorder; may be late, slows nobody
 
-Whatever ends the run (mission over, time up, SIGTERM, a crash in any thread), the last bytes are a stop.
+Whatever ends the run (mission over, time up, Ctrl-C, SIGTERM, SIGHUP, a full disk, a crash in any thread),
+the last bytes are a stop.
 """
 
 import asyncio
-import contextlib
 import sys
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from drivers.driver import PortLost, PortOpened, cancelled_by_signals
+from drivers.driver import PortLost, PortOpened
 from drivers.hokuyo.driver import HokuyoDriver
 from drivers.hokuyo.session import HokuyoEvent
 from drivers.kobuki.driver import KobukiDriver
@@ -26,6 +26,7 @@ from robot.clock import Clock, MonotonicClock, stamp_ns
 from robot.core import NAVIGATION_PERIOD_S, RobotCore, Samples
 from robot.exchange import Ended, Level, MissionState
 from robot.feedback import Signal, signal_bytes
+from robot.interrupts import on_interrupt
 from robot.missions import Mission
 from robot.onlooker import Onlooker
 from robot.recording import Call, Entry
@@ -74,6 +75,7 @@ class Runtime:
         self._cycle_at_s = 0.0
         self._cycle_due = False
         self._crash: BaseException | None = None
+        self._interrupted = False
 
     def run(self, mission: Mission, duration_s: float) -> Ended:
         """Run until the mission is over, the time is up or somebody stops it. Call it from the main thread.
@@ -91,15 +93,22 @@ class Runtime:
                 ("onlooker", self._look),
             )
         ]
-        try:
-            return asyncio.run(self._loop(threads, duration_s))
-        finally:
-            self.stop.set()
-            for thread in threads:
-                if thread.ident is not None:
-                    thread.join(JOIN_S)
-            self.onlooker.look(self.clock.now_s())
-            sys.setswitchinterval(switch_s)
+        with on_interrupt(self._interrupt):
+            try:
+                return asyncio.run(self._loop(threads, duration_s))
+            finally:
+                self.stop.set()
+                for thread in threads:
+                    if thread.ident is not None:
+                        thread.join(JOIN_S)
+                if not threads[-1].is_alive():  # a stuck disk holds it: then nothing more is taken
+                    self.onlooker.look(self.clock.now_s())
+                sys.setswitchinterval(switch_s)
+
+    def _interrupt(self) -> None:
+        """End the run: somebody wants it."""
+        self._interrupted = True
+        self.stop.set()
 
     # ---- the loop thread ----
 
@@ -110,9 +119,8 @@ class Runtime:
         for thread in threads:
             thread.start()
         try:
-            with _stopped_by_signals(output):
-                self.core.permit()
-                await asyncio.wait({output, *drivers}, return_when=asyncio.FIRST_COMPLETED)
+            self.core.permit()
+            await asyncio.wait({output, *drivers}, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self.core.halt()
             self._kobuki.stop()
@@ -189,9 +197,10 @@ class Runtime:
 
     def _ended(self) -> Ended:
         status, now_s = self.core.exchange.mission.get(), self.clock.now_s()
-        if status is None:
-            return Ended(now_s, MissionState.WAITING, "no map yet")
-        return Ended(now_s, status.state, status.text)
+        state, text = (status.state, status.text) if status else (MissionState.WAITING, "no map yet")
+        if self.onlooker.over:
+            state, text = MissionState.FAILED, self.onlooker.over
+        return Ended(now_s, state, text, self._interrupted, self.onlooker.over)
 
     # ---- the other threads ----
 
@@ -218,13 +227,5 @@ class Runtime:
     def _look(self) -> None:
         while not self.stop.wait(LOOK_PERIOD_S):
             self.onlooker.look(self.clock.now_s())
-
-
-@contextlib.contextmanager
-def _stopped_by_signals(task: "asyncio.Task[None]") -> Iterator[None]:
-    """Let SIGTERM and SIGINT end the run, where this is the main thread."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    with cancelled_by_signals(task):
-        yield
+            if self.onlooker.over:
+                self.stop.set()

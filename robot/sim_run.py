@@ -12,11 +12,10 @@ from robot.config import RobotConfig
 from robot.core import RobotCore
 from robot.depth import DepthFeed
 from robot.display import has_display
-from robot.exchange import Ended, MissionState
 from robot.lockstep import run_lockstep
 from robot.missions import parse_mission
 from robot.progress import Bar, first_use
-from robot.run import Run, RunPlan, Teller
+from robot.run import Run, RunPlan, Stopped, Teller
 from robot.runtime import Ports, Runtime
 from robot.sim_server import FakeHardware
 from robot.warmup import warm_up
@@ -88,6 +87,7 @@ def _drive_fast(options: SimOptions, run: Run) -> None:
 
     def watch(now_s: float) -> None:
         nonlocal look_at_s
+        run.check()
         if camera is not None:
             camera.poll(now_s)
         if now_s >= look_at_s:
@@ -96,10 +96,11 @@ def _drive_fast(options: SimOptions, run: Run) -> None:
 
     try:
         mission = parse_mission(options.mission)
-        ended = run_lockstep(simulator, run.core, mission, options.duration_s, run.files.raw.put, watch)
+        with run.until_asked():
+            ended = run_lockstep(simulator, run.core, mission, options.duration_s, run.files.raw.put, watch)
         run.end(ended, truth_of(simulator))
-    except KeyboardInterrupt:
-        run.end(Ended(simulator.now_s, MissionState.FAILED, "interrupted"), truth_of(simulator))
+    except Stopped as stopped:
+        run.stopped(simulator.now_s, stopped, truth_of(simulator))
     finally:
         simulator.close()
 

@@ -8,7 +8,7 @@ import termios
 import threading
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from lemtomap.errors import BadSetting
@@ -93,14 +93,20 @@ def driven_by_hand(listener: Listener, now_s: Callable[[], float]) -> Iterator[N
     finally:
         stop.set()
         reader.join(1.0)
-        termios.tcsetattr(terminal, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # the terminal is gone
+            termios.tcsetattr(terminal, termios.TCSADRAIN, before)
 
 
 def _keys_pressed(terminal: int, timeout_s: float) -> list[str]:
-    """Return the keys pressed, an arrow's three characters as one; empty when none was in time.
+    """Return the keys pressed, an arrow's three characters as one; empty when none was in time, `q` when the
+    terminal is gone.
 
     Read past Python's buffer, which would keep from `select` what it holds.
     """
     if not select.select([terminal], [], [], timeout_s)[0]:
         return []
-    return KEY.findall(os.read(terminal, 256).decode(errors="replace"))
+    try:
+        pressed = os.read(terminal, 256)
+    except OSError:
+        pressed = b""
+    return KEY.findall(pressed.decode(errors="replace")) or ["q"]

@@ -3,12 +3,13 @@
 Everything spatial is drawn in the grid frame (z only separates layers): the window as GridMap under
 the costmap, the topological map with the associated node and the route in colour, the robot with its
 scan and particles. Each kind of thing has its own rate limit, so a long run stays a small file and the
-viewer thread never falls behind. The only importer of `rerun`.
+viewer thread never falls behind. Logging never waits for the disk or the window. With `viewer_layout` and
+`viewer_truth` the only importer of `rerun`.
 """
 
-import sys
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,11 @@ from lemtomap.nav.types import CostmapView
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, GridView, MapView, Twist
 from robot.viewer_layout import ABOUT, EDGE_COLOURS, blueprint
+from robot.viewer_pipe import ViewerPipe
 from robot.viewer_truth import TruthView
+from robot.viewer_window import ViewerWindow
+
+rr.unregister_shutdown()  # it would wait at the program's end for what `close` did not wait for
 
 PATHS = NDArray[np.floating]
 
@@ -62,13 +67,24 @@ class ViewerConfig:
     plot_hz: float = 5.0
     timing_hz: float = 2.0
     flush_s: float = 2.0  # of wall time between two writes, unless somebody watches: each costs 1 kB a path
-    memory_limit: str = "1GB"  # of the spawned viewer, whose own default is 75 % of the machine
+    close_s: float = 3.0  # for the last bytes to reach the file
 
 
 class Viewer:
-    """Writes one .rrd; also streams to a spawned Rerun window if `live`. Calls come from one thread."""
+    """Writes one .rrd; also shows it in a Rerun window if `live`. Calls come from one thread.
 
-    def __init__(self, recording: Path, *, live: bool, config: ViewerConfig | None = None) -> None:
+    What goes wrong with file or window is said by `say`, in a line; the viewer goes on without it.
+    Raises OSError when the file cannot be made.
+    """
+
+    def __init__(
+        self,
+        recording: Path,
+        say: Callable[[str], None],
+        *,
+        live: bool,
+        config: ViewerConfig | None = None,
+    ) -> None:
         self._config = config or ViewerConfig()
         self._due: dict[str, float] = {}
         self._trail: deque[tuple[float, float, float]] = deque(maxlen=TRAIL_LENGTH)
@@ -76,10 +92,10 @@ class Viewer:
         self._truth: TruthView | None = None
         batches = None if live else rr.ChunkBatcherConfig(flush_tick=self._config.flush_s)
         self._stream = rr.RecordingStream("lemtomap", make_default=False, batcher_config=batches)
-        sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(recording))]
-        if live and self._open_window():
-            sinks.append(rr.GrpcSink())
-        self._stream.set_sinks(*sinks, default_blueprint=blueprint())
+        self._pipe = ViewerPipe(recording, say, ViewerWindow(say) if live else None)
+        self._stream.set_sinks(rr.FileSink(self._pipe.sink))
+        self._pipe.taken()
+        self._stream.send_blueprint(blueprint())
         self._log_static()
 
     def show_map(self, now_s: float, view: MapView) -> None:
@@ -165,26 +181,16 @@ class Viewer:
         if self._truth is not None and self._is_due("truth", now_s, self._config.window_hz):
             self._truth.show(now_s, T_world_base, T_grid_base)
 
+    def end_file(self, why: str) -> None:
+        """Write the recording no further, for the reason given; the window goes on."""
+        self._pipe.end_file(why)
+
     def close(self) -> None:
         """Finish the recording; later calls do nothing useful."""
-        self._stream.flush()
+        with suppress(RuntimeError, TimeoutError, ValueError):  # late: what is written stays
+            self._stream.flush(timeout_sec=self._config.close_s)
         self._stream.disconnect()
-
-    def _open_window(self) -> bool:
-        """Open the live viewer; tell whether it is there. A run goes on without it."""
-        beside = Path(sys.executable).with_name("rerun")  # an environment need not be on PATH
-        try:
-            rr.spawn(
-                connect=False,
-                memory_limit=self._config.memory_limit,
-                hide_welcome_screen=True,
-                executable_path=str(beside) if beside.exists() else None,
-                recording=self._stream,
-            )
-        except (RuntimeError, ValueError, OSError) as error:
-            sys.stderr.write(f"no live view: {error}\n")
-            return False
-        return True
+        self._pipe.close(self._config.close_s)
 
     def _at(self, now_s: float) -> None:
         """Stamp what follows with run time."""

@@ -510,9 +510,11 @@ class TopoMapper:
 
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""
-        if self._now is not None:
-            self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
-        self.store.close()
+        try:
+            if self._now is not None:
+                self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
+        finally:
+            self.store.close()
 
     def _require(self) -> _Now:
         if self._now is None:

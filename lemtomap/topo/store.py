@@ -2,12 +2,14 @@
 
 Writes go into one open transaction that `tick` commits at least every half second of the data's own time,
 so a power cut loses at most that; SQLite's write-ahead log keeps the file whole. One TopoStore writes, a
-second is refused; any number of TopoReader read the same file meanwhile.
+second is refused; any number of TopoReader read the same file meanwhile. A file that is deleted or moved
+while it is open is written anew on closing.
 """
 
 import contextlib
+import os
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
@@ -44,8 +46,13 @@ class TopoStore:
         readonly: bool = False,
     ) -> None:
         self.path = path
+        """Where the map stands when it is closed."""
         self.commit_every_s = commit_every_s
+        self.before_commit: Callable[[], None] | None = None
+        """Called before each commit, for whoever sees to the room on the disk: a failed one takes back all
+        that it holds."""
         self._db = connection
+        self._file = path.stat()
         self._readonly = readonly
         self._closed = False
         self._begun_s: float | None = None
@@ -132,6 +139,8 @@ class TopoStore:
     def commit(self) -> None:
         """Make everything so far safe."""
         if self._db.in_transaction:
+            if self.before_commit is not None:
+                self.before_commit()
             with schema.guarded(self.path):
                 if self._stamp_s is not None and self._blocked():
                     self.set_meta("stamp_s", self._stamp_s)
@@ -152,7 +161,10 @@ class TopoStore:
                 self.put_edge(replace(edge, blocked_until_s=until_s))
 
     def close(self) -> None:
-        """Commit, fold the write-ahead log into the one file, close. May be called again."""
+        """Commit, fold the write-ahead log into the one file, close. May be called again.
+
+        Raises BadMap when the disk refuses it, and OSError when a deleted file cannot be written anew.
+        """
         if self._closed:
             return
         self._closed = True
@@ -162,6 +174,9 @@ class TopoStore:
         try:
             self._write("DELETE FROM change WHERE version < ?", (self.version,))
             self.commit()
+            if not self._in_place():
+                self._write_anew()
+                return
             with schema.guarded(self.path):
                 self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             with contextlib.suppress(
@@ -176,6 +191,24 @@ class TopoStore:
                     self._db.execute("VACUUM")
         finally:
             self._db.close()
+
+    def _in_place(self) -> bool:
+        """Return True if the open file is the one at the map's path."""
+        try:
+            return os.path.samestat(self._file, self.path.stat())
+        except OSError:
+            return False
+
+    def _write_anew(self) -> None:
+        """Write a copy to the map's path, from which the open file has gone; beside it if another took it."""
+        while self.path.exists():
+            self.path = self.path.with_stem(f"{self.path.stem}-kept")
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        for suffix in ("-wal", "-shm"):  # of the file that has gone: they would be taken for the copy's
+            self.path.with_name(self.path.name + suffix).unlink(missing_ok=True)
+        with schema.guarded(self.path), contextlib.closing(sqlite3.connect(self.path)) as copy:
+            self._db.backup(copy)
+            copy.execute("PRAGMA journal_mode = DELETE")
 
     def __enter__(self) -> Self:
         return self

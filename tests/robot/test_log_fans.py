@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from tests.robot.carmen_lines import flaser, robotlaser1, written
 
 from lemtomap.errors import BadLog, BadSetting
 from robot.logs import open_log
+from tests.robot.carmen_lines import flaser, robotlaser1, written
 
 URG_DEG = 360.0 / 1024.0
 

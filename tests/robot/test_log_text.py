@@ -5,11 +5,11 @@ import lzma
 import os
 
 import pytest
-from tests.robot.carmen_lines import flaser
 
 from lemtomap.errors import BadLog
 from robot.cli import main
 from robot.logs import open_log, text
+from tests.robot.carmen_lines import flaser
 
 LINES = "".join(flaser([1.0] * 180, stamp=f"{k}.000000") + "\n" for k in range(5))
 

@@ -10,6 +10,7 @@ import yaml
 from lemtomap.errors import BadSetting
 from lemtomap.types import GridView
 from robot import outputs
+from robot.run_folder import RunFolder
 
 
 def test_trajectory_has_one_tum_line_per_scan_in_order_even_when_stamps_go_back(tmp_path):
@@ -76,3 +77,12 @@ def test_an_out_that_is_a_file_is_refused(tmp_path):
     with pytest.raises(BadSetting, match="is a file"), outputs.staged(tmp_path / "out"):
         pass
     assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_a_folder_that_a_run_writes_to_is_refused_until_it_ends(tmp_path):
+    running = RunFolder(tmp_path / "out")
+    with pytest.raises(BadSetting, match="another run writes there"):
+        make(tmp_path / "out", "mine")
+    running.close()
+    make(tmp_path / "out", "mine")
+    RunFolder(tmp_path / "out").close()
