@@ -160,14 +160,14 @@ def _model_of(cls: Any) -> type[BaseModel]:
 
 
 def _checked(hint: Any, default: Any) -> Any:
-    """Return the field's type with its limits: finite, and not negative where the default is not."""
+    """Return the field's type with its limits: finite, and not negative where the default is positive."""
     if dataclasses.is_dataclass(hint):
         return _model_of(hint)
     if hint is bool or isinstance(hint, types.GenericAlias):
         return hint
     if hint in (int, float):
         marks: list[Any] = [AllowInfNan(False)] if hint is float else [Strict()]
-        if default is None or default >= 0:
+        if default is None or default > 0:
             marks.append(Field(ge=0))
         return Annotated[hint, *marks]
     return hint

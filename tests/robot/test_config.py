@@ -22,6 +22,11 @@ def test_values_from_the_file_and_defaults_for_the_rest(tmp_path):
     assert loaded.safety.base_age_s == config.RobotConfig().safety.base_age_s
 
 
+def test_a_laser_may_sit_behind_right_of_and_turned_against_the_middle_of_the_base(tmp_path):
+    loaded = config.load(write(tmp_path, "[laser]\nx_m = -0.1\ny_m = -0.02\nyaw_rad = -3.14\n"))
+    assert loaded.laser == config.LaserConfig(-0.1, -0.02, -3.14)
+
+
 def test_what_a_run_used_can_be_read_back():
     used = config.RobotConfig()
     assert config.from_mapping(config.to_mapping(used)) == used
