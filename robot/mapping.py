@@ -12,6 +12,7 @@ from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.whereabouts import Watch
 from lemtomap.types import GridView, MapView, Odometry, Scan, SlamUpdate
 from robot.exchange import Exchange, Level, TimedScan
+from robot.mapped import MappedScan
 
 
 class GridSlam(Protocol):
@@ -47,6 +48,8 @@ class MappingStep:
     def step(self, timed: TimedScan) -> None:
         """Map one scan and publish what is known now; a robot in the air maps nothing."""
         stamp_s = timed.scan.stamp_s
+        events = () if timed.lifted else tuple(self._exchange.nav_events.drain())
+        self._exchange.mapped.put(MappedScan(stamp_s, timed.lifted, events))
         if timed.lifted:
             self._hold(stamp_s)
             return
@@ -55,7 +58,7 @@ class MappingStep:
             self._lifted_since_s = None
             if carried:
                 self._lose(stamp_s, "carried elsewhere, or put back: wheels hung in the air")
-        for event in self._exchange.nav_events.drain():
+        for event in events:
             if isinstance(event, LevelChanged):
                 self._change_level(stamp_s, event.level)
             else:
@@ -69,6 +72,11 @@ class MappingStep:
         self.mapper.update(update, self.slam.view(), timed.sighting.hits_base)
         self.scans += 1
         self._publish(self.mapper.view(self.slam.particles()))
+
+    def interrupt(self, stamp_s: float, why: str) -> None:
+        """Go on in a new part of the map: nobody knows where the robot drove meanwhile."""
+        if self.scans:
+            self._lose(stamp_s, why)
 
     def _hold(self, stamp_s: float) -> None:
         """Wait in the air; whoever looks at the map is told that the pose is worth nothing."""

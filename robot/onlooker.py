@@ -15,7 +15,8 @@ from lemtomap.types import MapView, Twist
 from robot.core import Efforts
 from robot.exchange import BaseStatus, Exchange, Note, TimedScan
 from robot.mailbox import BoundedQueue, Latest
-from robot.recording import Entry, Recorder
+from robot.mapped import to_values
+from robot.recording import SCAN_TOPIC, Entry, Recorder
 from robot.viewer import Viewer
 
 RAW_WAITING = 200_000  # calls of both sessions in some ten minutes
@@ -48,6 +49,8 @@ class Onlooker:
         if self._recorder is not None:
             for entry in self.raw.drain():
                 self._recorder.raw(entry)
+            for mapped in exchange.mapped.drain():
+                self._recorder.derived(SCAN_TOPIC, now_s, to_values(mapped))
         view = self._fresh("map", exchange.map_view)
         scan = self._fresh("scan", exchange.last_scan)
         output = self._fresh("navigation", exchange.nav_output)

@@ -13,8 +13,9 @@ from robot.build import build_core
 from robot.config import RobotConfig, to_mapping
 from robot.core import RobotCore
 from robot.exchange import Ended, Level, MissionState, Note
+from robot.parts import DEFAULT_LIMIT, parts_of
 from robot.progress import Bar
-from robot.run_files import RESULTS, RunFiles
+from robot.run_files import RECORDINGS, RESULTS, RecordPlan, RunFiles
 
 QUIET_S = 15.0  # of run time before nearly the same line is said again
 
@@ -36,6 +37,8 @@ class RunPlan:
     """True: except the map, which this run goes on with."""
     facts: Mapping[str, Any] = field(default_factory=dict)
     """For the summary."""
+    record_limit: int = DEFAULT_LIMIT
+    """Bytes of each of the two recordings; beyond, their oldest parts go."""
 
 
 class Teller:
@@ -80,7 +83,15 @@ class Run:
             _clear(plan)
         self._new_map = not plan.map_path.exists()
         self.core: RobotCore = build_core(plan.config, plan.map_path, slam=plan.slam, seed=plan.seed)
-        self.files = RunFiles(plan.out, plan.title, self.core, self._teller, live=plan.live)
+        recorded = {**_settings(plan), "title": plan.title, "new_map": self._new_map}
+        self.files = RunFiles(
+            plan.out,
+            plan.title,
+            self.core,
+            self._teller,
+            RecordPlan(recorded, plan.record_limit),
+            live=plan.live,
+        )
         return self
 
     def end(self, ended: Ended, truth: Mapping[str, Any] | None = None) -> None:
@@ -97,9 +108,13 @@ class Run:
         ended = self._ended or Ended(0.0, MissionState.FAILED, str(error))
         plan = self.plan
         told = {**plan.facts, "result": ended.state.value, "result_text": ended.text, **self._truth}
-        settings = {"seed": plan.seed, "config": {"slam": plan.slam, **to_mapping(plan.config)}}
+        settings = _settings(plan)
         self.summary = self.files.finish(
-            ended.now_s, plan.map_path, told, settings, whole_drive=self._new_map
+            ended.now_s,
+            plan.map_path,
+            told,
+            {"seed": plan.seed, "config": {"slam": plan.slam, **settings["config"]}},
+            whole_drive=self._new_map,
         )
 
     def _take_back(self) -> None:
@@ -115,9 +130,15 @@ class Run:
                 folder.rmdir()
 
 
+def _settings(plan: RunPlan) -> dict[str, Any]:
+    """Return what a replay needs to map the same scans in the same way."""
+    return {"slam": plan.slam, "seed": plan.seed, "config": to_mapping(plan.config)}
+
+
 def _clear(plan: RunPlan) -> None:
     """Remove an earlier run's results."""
     old_map = [] if plan.keep_map else [plan.map_path]
-    for path in (*old_map, *(plan.out / name for name in RESULTS)):
+    parts = [part for name in RECORDINGS for part in parts_of(plan.out / name)]
+    for path in (*old_map, *parts, *(plan.out / name for name in RESULTS)):
         for suffix in ("", "-wal", "-shm"):
             path.with_name(path.name + suffix).unlink(missing_ok=True)

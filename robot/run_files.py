@@ -17,13 +17,15 @@ from robot.exchange import Note
 from robot.final_map import FinalMap, final_map
 from robot.onlooker import Onlooker
 from robot.overview import Overview, WallSketch, draw
+from robot.parts import DEFAULT_LIMIT, PartFiles
 from robot.preview import draw_preview
 from robot.recording import Recorder
 from robot.viewer import Viewer
 
 PREVIEW_PERIOD_S = 15.0
 WALLS_PERIOD_S = 0.5  # of the scans that draw the walls in the picture
-RESULTS = ("trajectory.tum", "grid.pgm", "grid.yaml", "overview.png", "summary.json", "run.rrd", "run.mcap")
+RECORDINGS = ("run.rrd", "run.mcap")
+RESULTS = ("trajectory.tum", "grid.pgm", "grid.yaml", "overview.png", "summary.json", *RECORDINGS)
 
 
 class Listener(Protocol):
@@ -38,6 +40,14 @@ class Listener(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class RecordPlan:
+    """What the recordings tell of the run, and how large each of them may become."""
+
+    about: Mapping[str, Any] = field(default_factory=dict)
+    limit_bytes: int = DEFAULT_LIMIT
+
+
 @dataclass(slots=True)
 class _Clock:
     """When the run began, by the wall and by the processor."""
@@ -49,15 +59,17 @@ class _Clock:
 class RunFiles(Onlooker):
     """Recorder, viewer and, at the end, map, trajectory, picture and summary."""
 
-    def __init__(self, out: Path, title: str, core: RobotCore, listener: Listener, *, live: bool) -> None:
+    def __init__(
+        self, out: Path, title: str, core: RobotCore, listener: Listener, record: RecordPlan, *, live: bool
+    ) -> None:
         self._out, self._title, self._core, self._listener = out, title, core, listener
         self._begun = _Clock()
         self._walls = WallSketch()
         self._walls_due_s, self._preview_due_s = 0.0, PREVIEW_PERIOD_S
         self._truth: Callable[[], Pose | None] | None = None
-        self._view = Viewer(out / "run.rrd", live=live)
-        recorder = Recorder(out / "run.mcap", {"title": title})
-        super().__init__(core.exchange, core.efforts, self._view, recorder, listener.say)
+        self._view = Viewer(out / "run.rrd", live=live, limit_bytes=record.limit_bytes)
+        self._recorded = Recorder(out / "run.mcap", record.about, record.limit_bytes)
+        super().__init__(core.exchange, core.efforts, self._view, self._recorded, listener.say)
 
     def show_world(self, outlines: Sequence[NDArray[np.float64]], truth: Callable[[], Pose | None]) -> None:
         """Show a simulated building, and from now on where the robot truly is in it, T_world_base."""
@@ -144,7 +156,21 @@ class RunFiles(Onlooker):
                 "navigation": _effort(core.efforts.navigation),
             },
             "dropped": core.exchange.dropped(),
+            "recorded": {
+                "run.mcap": _written(self._recorded.parts, now_s),
+                "run.rrd": _written(self._view.parts, now_s),
+            },
         }
+
+
+def _written(parts: PartFiles, now_s: float) -> dict[str, float]:
+    """Return what a recording grew by, and how many of its oldest parts went because of the limit."""
+    hours = max(now_s, 1.0) / 3600.0
+    return {
+        "bytes": parts.written_bytes,
+        "mb_per_hour": parts.written_bytes / 1e6 / hours,
+        "parts_dropped": parts.dropped,
+    }
 
 
 def _effort(effort: Effort) -> dict[str, float]:

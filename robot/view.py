@@ -6,6 +6,7 @@ from pathlib import Path
 
 from lemtomap.errors import BadInput
 from robot.display import has_display
+from robot.parts import parts_of
 
 RRD_MAGIC = b"RRF"  # Rerun's files begin with RRF and their version, RRF2 today
 
@@ -15,7 +16,8 @@ def open_recording(path: Path, *, web: bool = False) -> None:
     recording = find_recording(path)
     if not web and not has_display():
         raise BadInput(how_to_look(recording))
-    command = [sys.executable, "-m", "rerun", str(recording), *(["--serve-web"] if web else [])]
+    shown = [recording] if path.is_file() else parts_of(path / "run.rrd")
+    command = [sys.executable, "-m", "rerun", *map(str, shown), *(["--serve-web"] if web else [])]
     code = subprocess.run(command, check=False).returncode  # noqa: S603 - our own interpreter, a checked path
     if code:
         raise BadInput(f"{recording}: the Rerun viewer ended with code {code}")
@@ -23,7 +25,10 @@ def open_recording(path: Path, *, web: bool = False) -> None:
 
 def find_recording(path: Path) -> Path:
     """Return the recording meant by a folder or file; raises BadInput with the reason."""
-    recording = path / "run.rrd" if path.is_dir() else path
+    recording = path
+    if path.is_dir():
+        parts = parts_of(path / "run.rrd")
+        recording = parts[0] if parts else path / "run.rrd"
     if not recording.exists():
         raise BadInput(f"{recording}: no such recording")
     with recording.open("rb") as file:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from lemtomap.nav.types import CostmapView
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, GridView, MapView, Twist
+from robot.parts import DEFAULT_LIMIT, PartFiles
 from robot.viewer_layout import ABOUT, EDGE_COLOURS, blueprint
 from robot.viewer_truth import TruthView
 
@@ -61,6 +62,7 @@ class ViewerConfig:
     plan_hz: float = 2.5
     plot_hz: float = 5.0
     timing_hz: float = 2.0
+    part_hz: float = 0.2  # how often the file's size is looked at
     flush_s: float = 2.0  # of wall time between two writes, unless somebody watches: each costs 1 kB a path
     memory_limit: str = "1GB"  # of the spawned viewer, whose own default is 75 % of the machine
 
@@ -68,23 +70,30 @@ class ViewerConfig:
 class Viewer:
     """Writes one .rrd; also streams to a spawned Rerun window if `live`. Calls come from one thread."""
 
-    def __init__(self, recording: Path, *, live: bool, config: ViewerConfig | None = None) -> None:
+    def __init__(
+        self,
+        recording: Path,
+        *,
+        live: bool,
+        config: ViewerConfig | None = None,
+        limit_bytes: int = DEFAULT_LIMIT,
+    ) -> None:
         self._config = config or ViewerConfig()
+        self.parts = PartFiles(recording, limit_bytes)
         self._due: dict[str, float] = {}
         self._trail: deque[tuple[float, float, float]] = deque(maxlen=TRAIL_LENGTH)
         self._state = ""
         self._truth: TruthView | None = None
         batches = None if live else rr.ChunkBatcherConfig(flush_tick=self._config.flush_s)
         self._stream = rr.RecordingStream("lemtomap", make_default=False, batcher_config=batches)
-        sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(recording))]
-        if live and self._open_window():
-            sinks.append(rr.GrpcSink())
-        self._stream.set_sinks(*sinks, default_blueprint=blueprint())
-        self._log_static()
+        self._watched = live and self._open_window()
+        self._begin_part()
 
     def show_map(self, now_s: float, view: MapView) -> None:
         """Show the window, the graph near the robot, the particles and the map's own figures."""
         self._at(now_s)
+        if self._is_due("part", now_s, self._config.part_hz):
+            self._roll_when_full()
         if self._is_due("window", now_s, self._config.window_hz):
             self._log_window(view.grid)
             self._log_graph(view)
@@ -157,7 +166,7 @@ class Viewer:
     def show_world(self, outlines: Sequence[NDArray[np.float64]]) -> None:
         """Show a simulated building, outlines of float64 (N, 2) metres, in a tab of its own."""
         self._truth = TruthView(self._stream, outlines)
-        self._stream.send_blueprint(blueprint((*self._truth.middle_m.tolist(), self._truth.extent_m)))
+        self._stream.send_blueprint(self._blueprint())
 
     def show_truth(self, now_s: float, T_world_base: Pose, T_grid_base: Pose) -> None:
         """Show where a simulated robot truly is beside where it believes to be. Needs show_world before."""
@@ -169,6 +178,27 @@ class Viewer:
         """Finish the recording; later calls do nothing useful."""
         self._stream.flush()
         self._stream.disconnect()
+
+    def _begin_part(self) -> None:
+        """Write to this part from now on; each can be looked at by itself."""
+        sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(self.parts.path))]
+        if self._watched:
+            sinks.append(rr.GrpcSink())
+        self._stream.set_sinks(*sinks, default_blueprint=self._blueprint())
+        self._log_static()
+        if self._truth is not None:
+            self._truth.begin()
+
+    def _roll_when_full(self) -> None:
+        """Go on with the next part when this one is full."""
+        if self.parts.full:
+            self.parts.advance()
+            self._begin_part()
+
+    def _blueprint(self) -> rr.blueprint.Blueprint:
+        """Return how the screen is laid out, with the building when there is one."""
+        truth = self._truth
+        return blueprint() if truth is None else blueprint((*truth.middle_m.tolist(), truth.extent_m))
 
     def _open_window(self) -> bool:
         """Open the live viewer; tell whether it is there. A run goes on without it."""

@@ -10,8 +10,8 @@ import numpy as np
 from PIL import Image
 
 from robot.cli import main
-from robot.recording import Recorder
-from robot.wire import HOKUYO, KOBUKI, RecordedHokuyoSession, RecordedKobukiSession, Wire
+from robot.recording import HOKUYO, KOBUKI, Recorder
+from robot.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
 
 HALL_M = (8.0, 4.0)
 SCANS = 24
