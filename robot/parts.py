@@ -68,7 +68,7 @@ def parts_of(first: Path) -> list[Path]:
 
 def parse_size(text: str) -> int:
     """Return the bytes meant by "500MB" or "2 GB". Raises BadSetting."""
-    match = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([kMGT]?)B?", text.strip())
+    match = re.fullmatch(r"([0-9]{1,15}(?:\.[0-9]{1,9})?)\s*([kMGT]?)B?", text.strip())
     if match is None:
         raise BadSetting(f"size '{text}': must be a number of bytes like 500MB or 2GB")
     size = int(float(match[1]) * UNITS[match[2]])

@@ -92,8 +92,7 @@ class Viewer:
     def show_map(self, now_s: float, view: MapView) -> None:
         """Show the window, the graph near the robot, the particles and the map's own figures."""
         self._at(now_s)
-        if self._is_due("part", now_s, self._config.part_hz):
-            self._roll_when_full()
+        self.keep_within_limit(now_s)
         if self._is_due("window", now_s, self._config.window_hz):
             self._log_window(view.grid)
             self._log_graph(view)
@@ -174,6 +173,12 @@ class Viewer:
         if self._truth is not None and self._is_due("truth", now_s, self._config.window_hz):
             self._truth.show(now_s, T_world_base, T_grid_base)
 
+    def keep_within_limit(self, now_s: float) -> None:
+        """Now and then, go on with the next part when this one is full."""
+        if self._is_due("part", now_s, self._config.part_hz) and self.parts.full:
+            self.parts.advance()
+            self._begin_part()
+
     def close(self) -> None:
         """Finish the recording; later calls do nothing useful."""
         self._stream.flush()
@@ -188,12 +193,6 @@ class Viewer:
         self._log_static()
         if self._truth is not None:
             self._truth.begin()
-
-    def _roll_when_full(self) -> None:
-        """Go on with the next part when this one is full."""
-        if self.parts.full:
-            self.parts.advance()
-            self._begin_part()
 
     def _blueprint(self) -> rr.blueprint.Blueprint:
         """Return how the screen is laid out, with the building when there is one."""

@@ -244,5 +244,5 @@ def test_events_of_navigation_come_back_as_they_were():
     ids=str,
 )
 def test_an_event_that_makes_no_sense_is_refused(event):
-    with pytest.raises(ValueError, match="."):
+    with pytest.raises(ValueError, match=r"no |base64"):
         from_values({"scan_s": 1.0, "lifted": False, "events": [event]})
