@@ -42,9 +42,11 @@ def test_what_a_run_used_can_be_read_back():
         ("[safety]\nbase_age_s = nan\n", ["robot.toml:2", "safety.base_age_s", "finite"]),
         ("[safety]\nscan_valid_beams = 1.5\n", ["robot.toml:2", "safety.scan_valid_beams", "integer"]),
         ("[safety\n", ["robot.toml", "line 1"]),
+        (f"[safety]\nx = {'[' * 5000}", ["robot.toml", "nested too deep"]),
+        (f"[safety]\nv_max_mps = {'9' * 5000}", ["robot.toml", "digits"]),
         ("[ports]\nkobuki='/dev/a'\nhokuyo='/dev/a'\n", ["robot.toml:3", "ports.hokuyo", "both"]),
     ],
-    ids=str,
+    ids=lambda value: str(value)[:40],
 )
 def test_a_bad_file_is_refused_with_line_key_and_reason(tmp_path, text, words):
     with pytest.raises(BadSetting) as error:

@@ -186,16 +186,15 @@ def test_each_kind_of_bad_chunk_is_left_out_and_named(whole, change, reason):
     assert calls(path)[-1] == made[-1]
 
 
-def test_a_frame_that_promises_gigabytes_is_not_believed(whole):
+def test_a_frame_that_promises_more_than_its_chunk_is_not_unpacked(whole):
     path, _ = whole
     zstandard = pytest.importorskip("zstandard")
     records = mcap_records(path.read_bytes()[MAGIC_BYTES:])
     second = [index for index, (opcode, _) in enumerate(records) if opcode == CHUNK][1]
     old = records[second][1]
-    frame = bytearray(zstandard.compress(b"\x00" * 70_000))
-    frame[5:9] = struct.pack("<I", 2**32 - 1)
+    frame = zstandard.compress(b"\x00" * 10_000_000)
     head = old[:16] + struct.pack("<QII", 70_000, zlib.crc32(b""), 4) + b"zstd"
-    records[second] = (CHUNK, head + struct.pack("<Q", len(frame)) + bytes(frame))
+    records[second] = (CHUNK, head + struct.pack("<Q", len(frame)) + frame)
     path.write_bytes(path.read_bytes()[:MAGIC_BYTES] + mcap_bytes(records))
     assert "does not unpack" in Recording.open(path).told_gaps()
 
@@ -246,9 +245,13 @@ def test_a_part_that_somebody_removed_is_a_gap(tmp_path):
 
 
 def test_every_later_part_begins_with_what_the_laser_said_when_it_connected(tmp_path):
-    record(tmp_path / "run.mcap", entries(5000), limit_bytes=SMALL_LIMIT)
+    recorder = Recorder(tmp_path / "run.mcap", limit_bytes=SMALL_LIMIT)
+    for entry in entries(5000):
+        recorder.raw(entry)
+    recorder._file.flush()  # killed: what closing writes is not there
     (tmp_path / "run.mcap").unlink()
     assert calls(tmp_path)[1 : 1 + len(OPENING)] == OPENING
+    recorder.close()
 
 
 def test_a_lost_beginning_is_made_good_by_the_conversation_at_the_end(tmp_path):
