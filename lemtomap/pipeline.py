@@ -70,14 +70,14 @@ class Mapper:
             return Mapped()
         carried = self._watch.put_down(scan.stamp_s)
         if carried:
-            self._lose()
+            self.lose()
         for event in events:
             self._apply(event)
         slam = self._slam.update(scan, odometry)
         hits = self._slam.points_base() if hits_base is None else hits_base
         moved = self._watch.displaced(slam, odometry, hits) if self._is_watched else ""
         if moved:  # this scan may show both places: the new window begins with the next
-            self._lose()
+            self.lose()
             return Mapped(slam, moved)
         if self._grid is None or slam.integrated:
             self._grid = self._slam.view()  # between integrations the window does not change
@@ -103,7 +103,7 @@ class Mapper:
             self._begin_window()
             self.topo.change_level(event.level)
 
-    def _lose(self) -> None:
+    def lose(self) -> None:
         """Begin with an empty window, in a part of the map of its own."""
         self._disown()
         self._begin_window()

@@ -26,11 +26,11 @@ from robot.config import RobotConfig
 from robot.exchange import BaseStatus, Exchange, Level, TimedScan
 from robot.feedback import Condition, Indicators, Signal
 from robot.notes import describe_event
+from robot.recording import HOKUYO, KOBUKI
 from robot.reflex import Retreat
 from robot.safety import Allowed, Evidence, Reason, SafetyGate, Sides
 from robot.velocity import DOCKING, NAVIGATION, SAFETY, TELEOP, VelocityMux, VelocitySmoother, Wish
 from robot.watchdog import Watchdog
-from robot.wire import HOKUYO, KOBUKI
 
 SCAN_PATIENCE_S = 0.3  # a scan whose odometry has not come by then belongs to a silent base
 

@@ -27,6 +27,13 @@ Out = Annotated[
 Config = Annotated[
     Path | None, typer.Option(metavar="FILE.toml", help="settings that differ from the defaults")
 ]
+RecordLimit = Annotated[
+    str,
+    typer.Option(
+        metavar="SIZE",
+        help="of run.mcap and of run.rrd, each; beyond it the oldest parts go",
+    ),
+]
 Duration = Annotated[
     float, typer.Option(metavar="S", min=1.0, help="end at the latest after this many seconds")
 ]
@@ -107,6 +114,7 @@ def sim(
     depth: Annotated[
         bool, typer.Option("--depth", help="carry a depth camera, which sees what the laser overlooks")
     ] = False,
+    record_limit: RecordLimit = "2GB",
     nav: Annotated[
         Nav, typer.Option(help="metric: the baseline, AMCL and a planner over the whole plan; goto:X:Y")
     ] = Nav.TOPOLOGICAL,
@@ -123,12 +131,22 @@ def sim(
 
         serve_world(world, seed, duration_s=math.inf, truth_path=None, gui=gui)
         return
+    from robot.parts import parse_size
     from robot.progress import progress_bar
     from robot.sim_run import SimOptions, run_sim
     from robot.told import conclude
 
     options = SimOptions(
-        world, mission, duration, out, seed, fast=fast, gui=gui, map_path=map_file, depth=depth
+        world,
+        mission,
+        duration,
+        out,
+        seed,
+        fast=fast,
+        gui=gui,
+        map_path=map_file,
+        depth=depth,
+        record_limit=parse_size(record_limit),
     )
     if nav is Nav.METRIC:
         from robot.metric_run import run_metric, told_after_metric
@@ -166,12 +184,18 @@ def run(
     duration: Duration = math.inf,
     out: Out = None,
     config: Config = None,
+    record_limit: RecordLimit = "2GB",
     seed: Annotated[int, typer.Option(metavar="N", help="of the particles")] = 0,
 ) -> None:
     """Run the real robot: map, explore, drive to places. Ctrl-C stops it and writes the results."""
+    from robot.parts import parse_size
     from robot.robot_run import RobotOptions
 
-    _drive("run", RobotOptions(mission, duration, kobuki, hokuyo, map_file, out, config, seed))
+    limit = parse_size(record_limit)
+    _drive(
+        "run",
+        RobotOptions(mission, duration, kobuki, hokuyo, map_file, out, config, seed, record_limit=limit),
+    )
 
 
 def goto(
@@ -216,11 +240,14 @@ def record(
     duration: Duration = math.inf,
     out: Out = None,
     config: Config = None,
+    record_limit: RecordLimit = "2GB",
 ) -> None:
     """Record both devices' bytes, and map, without driving; 'lemtomap replay' maps the recording anew."""
+    from robot.parts import parse_size
     from robot.robot_run import RobotOptions
 
-    _drive("record", RobotOptions("idle", duration, kobuki, hokuyo, None, out, config))
+    limit = parse_size(record_limit)
+    _drive("record", RobotOptions("idle", duration, kobuki, hokuyo, None, out, config, record_limit=limit))
 
 
 def replay(
@@ -229,8 +256,12 @@ def replay(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="folder for the results; default runs/replay_DATE_TIME")
     ] = None,
-    slam: Annotated[str, typer.Option(help="window, rolling or gmapping")] = "window",
-    seed: Annotated[int, typer.Option(metavar="N", help="of the particles")] = 0,
+    slam: Annotated[
+        str | None, typer.Option(help="window, rolling or gmapping; default: as the run mapped")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(metavar="N", help="of the particles; default: as the run mapped")
+    ] = None,
 ) -> None:
     """Feed a recorded run's bytes through the same drivers and map it anew, as fast as the machine can."""
     from robot.progress import progress_bar

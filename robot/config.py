@@ -72,7 +72,9 @@ def load(path: Path, ports: ListPorts | None = None) -> RobotConfig:
         data = tomllib.loads(text)
     except FileNotFoundError:
         raise BadSetting(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except RecursionError:
+        raise BadSetting(f"{path}: nested too deep") from None
+    except (OSError, ValueError) as error:  # not UTF-8, no TOML, a number of 5,000 digits
         raise BadSetting(f"{path}: {error}") from None
     lines = key_lines(text)
     try:

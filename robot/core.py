@@ -13,7 +13,7 @@ from typing import TypeVar
 from drivers.hokuyo.session import HokuyoEvent
 from drivers.kobuki.session import KobukiEvent
 from robot.base import BaseStep, Commands
-from robot.exchange import Exchange
+from robot.exchange import Exchange, TimedScan
 from robot.mapping import MappingStep
 from robot.navigating import NavigationStep
 
@@ -86,11 +86,14 @@ class RobotCore:
     def map_one(self, timeout_s: float) -> bool:
         """Mapping: take one scan if there is one within the time; return True if there was."""
         timed = self.exchange.scans.get(timeout_s)
-        if timed is None:
-            return False
+        if timed is not None:
+            self.map(timed)
+        return timed is not None
+
+    def map(self, timed: TimedScan) -> None:
+        """Mapping: take this scan."""
         _timed(self.efforts.mapping, lambda: self.mapping.step(timed))
         self.exchange.mapped.put(timed.scan.stamp_s)
-        return True
 
     def navigate(self, now_s: float) -> None:
         """Navigation: run one cycle."""

@@ -12,11 +12,13 @@ from lemtomap.nav.types import Contact, NavOutput, Sighting
 from lemtomap.topo.events import NavEvent
 from lemtomap.types import MapView, Odometry, Scan
 from robot.mailbox import BoundedQueue, Latest
+from robot.mapped import MappedScan
 from robot.safety import Allowed, Reason
 from robot.velocity import Wish
 
 SCANS_WAITING = 4  # a mapper that is later than this gains nothing from older scans
 EVENTS_WAITING = 1000
+MAPPED_WAITING = 10_000  # scans in some ten minutes of a stalled disk
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +115,9 @@ class Exchange:
         self.nav_events: BoundedQueue[NavEvent] = BoundedQueue("events for the mapper", EVENTS_WAITING)
         self.mapped: Latest[float] = Latest()
         """Stamp of the scan that mapping finished last."""
+        self.mapped_scans: BoundedQueue[MappedScan] = BoundedQueue(
+            "mapped scans for the recorder", MAPPED_WAITING
+        )
         self.map_view: Latest[MapView] = Latest()
         self.cycle: Latest[float] = Latest()
         """When navigation began its latest cycle."""

@@ -6,7 +6,8 @@ from robot.core import RobotCore, Samples
 from robot.exchange import Ended, MissionState
 from robot.feedback import signal_bytes
 from robot.missions import Mission
-from robot.wire import HOKUYO, KOBUKI, RecordedHokuyoSession, RecordedKobukiSession, Sink, Wire
+from robot.recording import HOKUYO, KOBUKI
+from robot.wire import RecordedHokuyoSession, RecordedKobukiSession, Sink, Wire
 from sim.errors import Unplugged
 from sim.simulator import Simulator
 

@@ -3,6 +3,7 @@
 from lemtomap.pipeline import Mapper
 from lemtomap.types import MapView
 from robot.exchange import Exchange, Level, TimedScan
+from robot.mapped import MappedScan
 
 
 class MappingStep:
@@ -19,7 +20,8 @@ class MappingStep:
     def step(self, timed: TimedScan) -> None:
         """Map one scan and publish what is known now."""
         level, stamp_s = self.mapper.topo.level, timed.scan.stamp_s
-        events = [] if timed.lifted else self._exchange.nav_events.drain()
+        events = () if timed.lifted else tuple(self._exchange.nav_events.drain())
+        self._exchange.mapped_scans.put(MappedScan(stamp_s, timed.lifted, events))
         hits_base = timed.sighting.hits_base
         mapped = self.mapper.update(timed.scan, timed.odometry, hits_base, lifted=timed.lifted, events=events)
         self.scans += mapped.used
@@ -28,6 +30,13 @@ class MappingStep:
         if self.mapper.topo.level != level:
             self._exchange.note(stamp_s, "mapping", f"on level {self.mapper.topo.level} now")
         if mapped.used or self._published is not None:
+            self._publish(self.mapper.view())
+
+    def interrupt(self, stamp_s: float, why: str) -> None:
+        """Go on in a new part of the map: nobody knows where the robot drove meanwhile."""
+        if self.scans:
+            self._exchange.note(stamp_s, "mapping", why, Level.WARN)
+            self.mapper.lose()
             self._publish(self.mapper.view())
 
     def _publish(self, view: MapView) -> None:

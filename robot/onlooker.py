@@ -18,7 +18,8 @@ from robot.core import Efforts
 from robot.ending import reason_of
 from robot.exchange import BaseStatus, Exchange, Level, Note, TimedScan
 from robot.mailbox import BoundedQueue, Latest
-from robot.recording import Entry, Recorder
+from robot.mapped import to_values
+from robot.recording import SCAN_TOPIC, Entry, Recorder
 from robot.viewer import Viewer
 
 RAW_WAITING = 200_000  # calls of both sessions in some ten minutes
@@ -51,7 +52,7 @@ class Onlooker:
     def look(self, now_s: float) -> None:
         """Take everything that is new; call it about ten times a second."""
         exchange, self.now_s = self._exchange, now_s
-        notes, entries = exchange.notes.drain(), self.raw.drain()
+        notes, entries, mapped = exchange.notes.drain(), self.raw.drain(), exchange.mapped_scans.drain()
         view = self._fresh("map", exchange.map_view)
         scan = self._fresh("scan", exchange.last_scan)
         output = self._fresh("navigation", exchange.nav_output)
@@ -61,9 +62,11 @@ class Onlooker:
                 self._say(note)
         if self._recorder is not None:
             try:
+                for each in mapped:
+                    self._recorder.derived(SCAN_TOPIC, now_s, to_values(each))
                 self._record(self._recorder, now_s, notes, entries, view, output, status)
             except Exception as error:  # noqa: BLE001 - whatever it is, the robot drives on
-                self._end_recorder(f"{self._recorder.path} ends here: {reason_of(error)}")
+                self._end_recorder(f"{self._recorder.parts.path} ends here: {reason_of(error)}")
         if self._viewer is not None:
             try:
                 self._show(self._viewer, now_s, notes, view, scan, output, status)
@@ -74,7 +77,7 @@ class Onlooker:
     def end_recordings(self, why: str) -> None:
         """Write both recordings no further, for the reason given; the window goes on."""
         if self._recorder is not None:
-            self._end_recorder(f"{self._recorder.path} ends here: {why}")
+            self._end_recorder(f"{self._recorder.parts.path} ends here: {why}")
         if self._viewer is not None:
             self._viewer.end_file(why)
 

@@ -19,6 +19,7 @@ from robot import ports
 from robot.config import PortsConfig, RobotConfig, load
 from robot.display import has_display
 from robot.missions import parse_mission
+from robot.parts import DEFAULT_LIMIT
 from robot.progress import Bar, first_use
 from robot.run import Run, RunPlan, Teller
 from robot.runtime import Ports, Runtime
@@ -41,6 +42,8 @@ class RobotOptions:
     slam: str = DEFAULT_SLAM
     by_hand: bool = False
     """Drive by the keyboard, over whatever the mission wants."""
+    record_limit: int = DEFAULT_LIMIT
+    """Bytes of each recording."""
 
 
 def run_robot(options: RobotOptions, bar: Bar) -> dict[str, Any]:
@@ -61,6 +64,7 @@ def run_robot(options: RobotOptions, bar: Bar) -> dict[str, Any]:
         slam=options.slam,
         config=replace(config, ports=found),
         live=has_display(),
+        record_limit=options.record_limit,
         facts={"mission": options.mission, "kobuki": found.kobuki, "hokuyo": found.hokuyo},
     )
     with Run(plan, Teller(bar, options.duration_s)) as run:

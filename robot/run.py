@@ -15,10 +15,11 @@ from robot.config import RobotConfig, to_mapping
 from robot.core import RobotCore
 from robot.exchange import Ended, Level, MissionState, Note
 from robot.interrupts import on_interrupt
+from robot.parts import DEFAULT_LIMIT, parts_of
 from robot.progress import Bar
-from robot.run_files import RESULTS, RunFiles
+from robot.recording import HOKUYO, KOBUKI
+from robot.run_files import RECORDINGS, RESULTS, RecordPlan, RunFiles
 from robot.run_folder import RunFolder, Space
-from robot.wire import HOKUYO, KOBUKI
 
 QUIET_S = 15.0  # of run time before nearly the same line is said again
 
@@ -40,6 +41,8 @@ class RunPlan:
     """True: except the map, which this run goes on with."""
     facts: Mapping[str, Any] = field(default_factory=dict)
     """For the summary."""
+    record_limit: int = DEFAULT_LIMIT
+    """Bytes of each of the two recordings; beyond, their oldest parts go."""
 
 
 class Teller:
@@ -97,9 +100,14 @@ class Run:
         except BaseException:
             self._folder.take_back()
             raise
+        recorded = {**_settings(plan), "title": plan.title, "new_map": self._new_map}
         try:
             self.files = RunFiles(
-                self._folder, self._spaces, plan.title, self.core, self._teller, live=plan.live
+                self._folder,
+                self._spaces,
+                self.core,
+                self._teller,
+                RecordPlan(plan.title, recorded, plan.record_limit, live=plan.live),
             )
         except BaseException:
             self.core.close()
@@ -161,7 +169,8 @@ class Run:
             ended = replace(ended, state=MissionState.FAILED, text=faults[0])
         told = {**plan.facts, "result": ended.state.value, "result_text": ended.text, **self._truth}
         told |= {"interrupted": ended.interrupted, "faults": faults}
-        settings = {"seed": plan.seed, "config": {"slam": plan.slam, **to_mapping(plan.config)}}
+        config = {"slam": plan.slam, **_settings(plan)["config"]}
+        settings = {"seed": plan.seed, "config": config}
         self.summary = self.files.finish(ended.now_s, told, settings, whole_drive=self._new_map)
 
     def _missing(self) -> str:
@@ -194,9 +203,15 @@ def _wait() -> None:
     """Do nothing about an interrupt: the end is under way and takes a bounded time."""
 
 
+def _settings(plan: RunPlan) -> dict[str, Any]:
+    """Return what a replay needs to map the same scans in the same way."""
+    return {"slam": plan.slam, "seed": plan.seed, "config": to_mapping(plan.config)}
+
+
 def _clear(plan: RunPlan) -> None:
     """Remove an earlier run's results."""
     old_map = [] if plan.keep_map else [plan.map_path]
-    for path in (*old_map, *(plan.out / name for name in RESULTS)):
+    parts = [part for name in RECORDINGS for part in parts_of(plan.out / name)]
+    for path in (*old_map, *parts, *(plan.out / name for name in RESULTS)):
         for suffix in ("", "-wal", "-shm"):
             path.with_name(path.name + suffix).unlink(missing_ok=True)

@@ -20,6 +20,7 @@ from robot.exchange import Note
 from robot.final_map import FinalMap, final_map
 from robot.onlooker import Onlooker
 from robot.overview import Overview, WallSketch, draw
+from robot.parts import DEFAULT_LIMIT, PartFiles
 from robot.preview import draw_preview
 from robot.recording import Recorder
 from robot.run_folder import RunFolder, Space
@@ -28,7 +29,8 @@ from robot.viewer import Viewer
 PREVIEW_PERIOD_S = 15.0
 WALLS_PERIOD_S = 0.5  # of the scans that draw the walls in the picture
 FOLDER_PERIOD_S = 1.0  # of wall time between two looks at the folder and its disk
-RESULTS = ("trajectory.tum", "grid.pgm", "grid.yaml", "overview.png", "summary.json", "run.rrd", "run.mcap")
+RECORDINGS = ("run.rrd", "run.mcap")
+RESULTS = ("trajectory.tum", "grid.pgm", "grid.yaml", "overview.png", "summary.json", *RECORDINGS)
 
 # What each step of the end may take, s; a drive of hours is solved in less.
 LOOK_LIMIT_S, CLOSE_LIMIT_S, WRITE_LIMIT_S, PICTURE_LIMIT_S, SOLVE_LIMIT_S = 5.0, 10.0, 20.0, 60.0, 180.0
@@ -44,6 +46,16 @@ class Listener(Protocol):
     def look(self, now_s: float) -> None:
         """Show how far the run is."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class RecordPlan:
+    """What the recordings tell of the run, and how large each of them may become."""
+
+    title: str
+    about: Mapping[str, Any] = field(default_factory=dict)
+    limit_bytes: int = DEFAULT_LIMIT
+    live: bool = False
 
 
 @dataclass(slots=True)
@@ -64,14 +76,12 @@ class RunFiles(Onlooker):
         self,
         folder: RunFolder,
         spaces: Sequence[Space],
-        title: str,
         core: RobotCore,
         listener: Listener,
-        *,
-        live: bool,
+        record: RecordPlan,
     ) -> None:
         self._folder, self._spaces = folder, spaces
-        self._title, self._core, self._listener = title, core, listener
+        self._title, self._core, self._listener = record.title, core, listener
         self._begun = _Clock()
         self._walls = WallSketch()
         self._walls_due_s, self._preview_due_s, self._folder_due_s = 0.0, PREVIEW_PERIOD_S, 0.0
@@ -80,8 +90,13 @@ class RunFiles(Onlooker):
         self._space_lock = threading.Lock()
         core.mapping.mapper.topo.store.before_commit = self._mind_space
         super().__init__(core.exchange, core.efforts, say=listener.say)
-        self._recorder = Recorder(folder.path / "run.mcap", {"title": title})
-        self._view = Viewer(folder.path / "run.rrd", lambda text: self.warn("viewer", text), live=live)
+        self._recorder = self._recorded = Recorder(folder.path / "run.mcap", record.about, record.limit_bytes)
+        self._view = Viewer(
+            folder.path / "run.rrd",
+            lambda text: self.warn("viewer", text),
+            live=record.live,
+            limit_bytes=record.limit_bytes,
+        )
         self._viewer = self._view
 
     def show_world(self, outlines: Sequence[NDArray[np.float64]], truth: Callable[[], Pose | None]) -> None:
@@ -248,7 +263,21 @@ class RunFiles(Onlooker):
                 "navigation": _effort(core.efforts.navigation),
             },
             "dropped": core.exchange.dropped(),
+            "recorded": {
+                "run.mcap": _written(self._recorded.parts, now_s),
+                "run.rrd": _written(self._view.parts, now_s),
+            },
         }
+
+
+def _written(parts: PartFiles, now_s: float) -> dict[str, float]:
+    """Return what a recording grew by, and how many of its oldest parts went because of the limit."""
+    hours = max(now_s, 1.0) / 3600.0
+    return {
+        "bytes": parts.written_bytes,
+        "mb_per_hour": parts.written_bytes / 1e6 / hours,
+        "parts_dropped": parts.dropped,
+    }
 
 
 def _effort(effort: Effort) -> dict[str, float]:

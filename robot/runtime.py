@@ -29,8 +29,8 @@ from robot.feedback import Signal, signal_bytes
 from robot.interrupts import on_interrupt
 from robot.missions import Mission
 from robot.onlooker import Onlooker
-from robot.recording import Call, Entry
-from robot.wire import HOKUYO, KOBUKI, LOST, OPENED, RecordedHokuyoSession, RecordedKobukiSession
+from robot.recording import HOKUYO, KOBUKI, LOST, OPENED, Call, Entry
+from robot.wire import RecordedHokuyoSession, RecordedKobukiSession
 
 OUTPUT_PERIOD_S = 0.02  # design, section 4
 LOOK_PERIOD_S = 0.1

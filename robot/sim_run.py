@@ -14,6 +14,7 @@ from robot.depth import DepthFeed
 from robot.display import has_display
 from robot.lockstep import run_lockstep
 from robot.missions import parse_mission
+from robot.parts import DEFAULT_LIMIT
 from robot.progress import Bar, first_use
 from robot.run import Run, RunPlan, Stopped, Teller
 from robot.runtime import Ports, Runtime
@@ -43,6 +44,8 @@ class SimOptions:
     """A map to go on with, wherever in it the robot stands; None: a new one."""
     depth: bool = False
     """Carry the simulated depth camera, too."""
+    record_limit: int = DEFAULT_LIMIT
+    """Bytes of each recording."""
 
 
 def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
@@ -65,6 +68,7 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
         slam=options.slam,
         config=RobotConfig(),
         live=options.live and has_display(),
+        record_limit=options.record_limit,
         replace=True,
         keep_map=options.map_path is not None,
         facts={"world": options.world, "mission": options.mission},

@@ -7,6 +7,7 @@ from urllib.parse import quote
 
 from lemtomap.errors import BadInput
 from robot.display import has_display
+from robot.parts import parts_of
 from robot.viewer_command import LOOPBACK, end_viewer, start_viewer
 
 RRD_MAGIC = b"RRF"  # Rerun's files begin with RRF and their version, RRF2 today
@@ -21,12 +22,13 @@ def open_recording(path: Path, say: Callable[[str], None], *, web: bool = False)
     recording = find_recording(path)
     if not web and not has_display():
         raise BadInput(how_to_look(recording))
+    shown = [recording] if path.is_file() else parts_of(path / "run.rrd")
     options = ["--port", "auto"]
     if web:
         page, data = free_ports(WEB_PORTS)
         options = ["--serve-web", "--web-viewer-port", str(page), "--port", str(data)]
         say(where_to_look(page, data))
-    viewer = start_viewer(str(recording), *options, quiet=web)
+    viewer = start_viewer(*map(str, shown), *options, quiet=web)
     try:
         code = viewer.wait()
     finally:
@@ -63,7 +65,10 @@ def where_to_look(page: int, data: int) -> str:
 
 def find_recording(path: Path) -> Path:
     """Return the recording meant by a folder or file; raises BadInput with the reason."""
-    recording = path / "run.rrd" if path.is_dir() else path
+    recording = path
+    if path.is_dir():
+        parts = parts_of(path / "run.rrd")
+        recording = parts[0] if parts else path / "run.rrd"
     if not recording.exists():
         raise BadInput(f"{recording}: no such recording")
     with recording.open("rb") as file:

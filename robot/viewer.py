@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from lemtomap.nav.types import CostmapView
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, GridView, MapView, Twist
+from robot.parts import DEFAULT_LIMIT, PartFiles
 from robot.viewer_layout import ABOUT, EDGE_COLOURS, blueprint
 from robot.viewer_pipe import ViewerPipe
 from robot.viewer_truth import TruthView
@@ -66,6 +67,7 @@ class ViewerConfig:
     plan_hz: float = 2.5
     plot_hz: float = 5.0
     timing_hz: float = 2.0
+    part_hz: float = 0.2  # how often the file's size is looked at
     flush_s: float = 2.0  # of wall time between two writes, unless somebody watches: each costs 1 kB a path
     close_s: float = 3.0  # for the last bytes to reach the file
 
@@ -84,23 +86,24 @@ class Viewer:
         *,
         live: bool,
         config: ViewerConfig | None = None,
+        limit_bytes: int = DEFAULT_LIMIT,
     ) -> None:
         self._config = config or ViewerConfig()
+        self.parts = PartFiles(recording, limit_bytes)
         self._due: dict[str, float] = {}
         self._trail: deque[tuple[float, float, float]] = deque(maxlen=TRAIL_LENGTH)
         self._state = ""
         self._truth: TruthView | None = None
         batches = None if live else rr.ChunkBatcherConfig(flush_tick=self._config.flush_s)
         self._stream = rr.RecordingStream("lemtomap", make_default=False, batcher_config=batches)
-        self._pipe = ViewerPipe(recording, say, ViewerWindow(say) if live else None)
-        self._stream.set_sinks(rr.FileSink(self._pipe.sink))
-        self._pipe.taken()
-        self._stream.send_blueprint(blueprint())
-        self._log_static()
+        self._say = say
+        self._window = ViewerWindow(say) if live else None
+        self._pipe = self._begin_part()
 
     def show_map(self, now_s: float, view: MapView) -> None:
         """Show the window, the graph near the robot, the particles and the map's own figures."""
         self._at(now_s)
+        self.keep_within_limit(now_s)
         if self._is_due("window", now_s, self._config.window_hz):
             self._log_window(view.grid)
             self._log_graph(view)
@@ -173,7 +176,7 @@ class Viewer:
     def show_world(self, outlines: Sequence[NDArray[np.float64]]) -> None:
         """Show a simulated building, outlines of float64 (N, 2) metres, in a tab of its own."""
         self._truth = TruthView(self._stream, outlines)
-        self._stream.send_blueprint(blueprint((*self._truth.middle_m.tolist(), self._truth.extent_m)))
+        self._stream.send_blueprint(self._blueprint())
 
     def show_truth(self, now_s: float, T_world_base: Pose, T_grid_base: Pose) -> None:
         """Show where a simulated robot truly is beside where it believes to be. Needs show_world before."""
@@ -185,12 +188,36 @@ class Viewer:
         """Write the recording no further, for the reason given; the window goes on."""
         self._pipe.end_file(why)
 
+    def keep_within_limit(self, now_s: float) -> None:
+        """Now and then, go on with the next part when this one is full."""
+        if self._is_due("part", now_s, self._config.part_hz) and self._pipe.writes and self.parts.full:
+            self.parts.advance()
+            self._pipe = self._begin_part()
+
     def close(self) -> None:
         """Finish the recording; later calls do nothing useful."""
         with suppress(RuntimeError, TimeoutError, ValueError):  # late: what is written stays
             self._stream.flush(timeout_sec=self._config.close_s)
         self._stream.disconnect()
         self._pipe.close(self._config.close_s)
+        if self._window is not None:
+            self._window.close()
+
+    def _begin_part(self) -> ViewerPipe:
+        """Write to this part from now on; each can be looked at by itself."""
+        pipe = ViewerPipe(self.parts.path, self._say, self._window)
+        self._stream.set_sinks(rr.FileSink(pipe.sink))
+        pipe.taken()
+        self._stream.send_blueprint(self._blueprint())
+        self._log_static()
+        if self._truth is not None:
+            self._truth.begin()
+        return pipe
+
+    def _blueprint(self) -> rr.blueprint.Blueprint:
+        """Return how the screen is laid out, with the building when there is one."""
+        truth = self._truth
+        return blueprint() if truth is None else blueprint((*truth.middle_m.tolist(), truth.extent_m))
 
     def _at(self, now_s: float) -> None:
         """Stamp what follows with run time."""

@@ -13,23 +13,15 @@ from typing import BinaryIO
 from robot.viewer_window import ViewerWindow
 
 PIECE_BYTES = 1 << 16
-LIMIT_BYTES = 2_000_000_000  # some eight hours; a viewer would not open more
 
 
 class ViewerPipe:
-    """Carries one recording. Raises OSError when its file cannot be made."""
+    """Carries one part of a recording. Raises OSError when its file cannot be made."""
 
-    def __init__(
-        self,
-        path: Path,
-        say: Callable[[str], None],
-        window: ViewerWindow | None = None,
-        limit_bytes: int = LIMIT_BYTES,
-    ) -> None:
-        self._path, self._say, self._window, self._limit_bytes = path, say, window, limit_bytes
+    def __init__(self, path: Path, say: Callable[[str], None], window: ViewerWindow | None = None) -> None:
+        self._path, self._say, self._window = path, say, window
         self._lock = threading.Lock()
         self._file: BinaryIO | None = path.open("wb", buffering=0)
-        self._written = 0
         self._read_end, self._write_end = os.pipe()
         self._carrier = threading.Thread(target=self._carry, name="viewer", daemon=True)
         self._carrier.start()
@@ -38,6 +30,11 @@ class ViewerPipe:
     def sink(self) -> str:
         """The path that Rerun shall write to."""
         return f"/dev/fd/{self._write_end}"
+
+    @property
+    def writes(self) -> bool:
+        """Whether the file is still written."""
+        return self._file is not None
 
     def taken(self) -> None:
         """Rerun has opened its end: the recording ends when it closes it."""
@@ -54,14 +51,15 @@ class ViewerPipe:
         self._say(f"{self._path} ends here: {why}")
 
     def close(self, patience_s: float) -> None:
-        """Wait for the last bytes, close file and window. Rerun must have closed its end."""
+        """Wait for the last bytes and close the file. Rerun must have closed its end."""
         self._carrier.join(patience_s)
+        self._close_file()
+
+    def _close_file(self) -> None:
         with self._lock:
-            if self._file is not None:
-                self._file.close()
-                self._file = None
-        if self._window is not None:
-            self._window.close()
+            file, self._file = self._file, None
+        if file is not None:
+            file.close()
 
     def _carry(self) -> None:
         """Take whatever comes, until Rerun closes its end."""
@@ -70,6 +68,7 @@ class ViewerPipe:
             if self._window is not None:
                 self._window.put(data)
         os.close(self._read_end)
+        self._close_file()
 
     def _keep(self, data: bytes) -> None:
         try:
@@ -77,12 +76,8 @@ class ViewerPipe:
                 if self._file is None:
                     return
                 _write_all(self._file, data)
-            self._written += len(data)
         except OSError as error:
             self.end_file(error.strerror or str(error))
-            return
-        if self._written > self._limit_bytes:
-            self.end_file(f"{self._written / 1e9:.1f} GB are enough for a viewer")
 
 
 def _write_all(file: BinaryIO, data: bytes) -> None:

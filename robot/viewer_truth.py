@@ -25,8 +25,13 @@ class TruthView:
         points = np.concatenate(list(outlines))
         self.middle_m = (points.min(axis=0) + points.max(axis=0)) / 2
         self.extent_m = float((points.max(axis=0) - points.min(axis=0)).max())
-        walls = rr.LineStrips3D([_flat(outline) for outline in outlines], colors=WALL_COLOUR, radii=0.02)
-        stream.log("truth/walls", walls, static=True)
+        self._outlines = [_flat(outline) for outline in outlines]
+        self.begin()
+
+    def begin(self) -> None:
+        """Log the building; once in each part of the recording."""
+        walls = rr.LineStrips3D(self._outlines, colors=WALL_COLOUR, radii=0.02)
+        self._stream.log("truth/walls", walls, static=True)
 
     def show(self, now_s: float, T_world_base: se2.Pose, T_grid_base: se2.Pose) -> None:
         """Show both poses and, now and then, both trails."""

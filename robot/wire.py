@@ -6,13 +6,11 @@ from typing import Generic, Protocol, TypeVar
 from drivers.hokuyo.session import HokuyoEvent, HokuyoSession
 from drivers.kobuki.session import KobukiEvent, KobukiSession
 from robot.clock import stamp_ns
-from robot.recording import Call, Entry
+from robot.recording import HOKUYO, KOBUKI, LOST, OPENED, UP, Call, Entry
 
 E = TypeVar("E")
 
 Sink = Callable[[Entry], None]
-KOBUKI, HOKUYO = "kobuki", "hokuyo"
-OPENED, LOST = b"opened", b"lost"
 
 
 class Session(Protocol[E]):
@@ -52,17 +50,25 @@ class RecordedKobukiSession(KobukiSession):
 
 
 class RecordedHokuyoSession(HokuyoSession):
-    """Writes down every call that changes what comes out."""
+    """Writes down every call that changes what comes out, and when the laser began to stream."""
 
     def __init__(self, record: Sink) -> None:
         self._record = record
         super().__init__()
+
+    def reopened(self) -> None:
+        """Begin anew after the port was opened again."""
+        super().reopened()
+        self._streams = False
 
     def receive(self, data: bytes, now_s: float) -> list[HokuyoEvent]:
         """Take bytes, return events."""
         events = super().receive(data, now_s)
         if data or events:
             self._record(Entry(HOKUYO, Call.RECEIVE, stamp_ns(now_s), data))
+        if self.alive and not self._streams:
+            self._streams = True
+            self._record(Entry(HOKUYO, Call.PORT, stamp_ns(now_s), UP))
         return events
 
     def tick(self, now_s: float) -> bytes:

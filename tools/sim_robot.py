@@ -15,7 +15,8 @@ from lemtomap.se2 import Pose
 from robot.base import BaseStep
 from robot.config import RobotConfig
 from robot.exchange import Exchange, TimedScan
-from robot.wire import HOKUYO, KOBUKI, RecordedHokuyoSession, RecordedKobukiSession, Wire
+from robot.recording import HOKUYO, KOBUKI
+from robot.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
 from sim.errors import Unplugged
 from sim.simulator import Simulator
 from sim.tours import Tour, base_command

@@ -91,7 +91,7 @@ def lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _refuse_non_file(path: Path, *, packed: bool) -> None:
-    """Raise BadLog for a pipe or a device, which may never end, a folder, and what is too long as it stands."""
+    """Raise BadLog for a pipe or a device, which may never end, a folder, and what is too long."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise BadLog("is no file")

@@ -27,6 +27,11 @@ def test_values_from_the_file_and_defaults_for_the_rest(tmp_path):
     assert loaded.safety.base_age_s == config.RobotConfig().safety.base_age_s
 
 
+def test_a_laser_may_sit_behind_right_of_and_turned_against_the_middle_of_the_base(tmp_path):
+    loaded = config.load(write(tmp_path, "[laser]\nx_m = -0.1\ny_m = -0.02\nyaw_rad = -3.14\n"))
+    assert loaded.laser == config.LaserConfig(-0.1, -0.02, -3.14)
+
+
 def test_what_a_run_used_can_be_read_back():
     used = config.RobotConfig()
     assert config.from_mapping(config.to_mapping(used)) == used
@@ -60,9 +65,11 @@ def test_what_a_run_used_can_be_read_back():
             ["robot.toml:2", "nav.body.radius_m", "1000000000000.0", "between 0.1 and 0.6"],
         ),
         ("[safety\n", ["robot.toml", "line 1"]),
+        (f"[safety]\nx = {'[' * 5000}", ["robot.toml", "nested too deep"]),
+        (f"[safety]\nv_max_mps = {'9' * 5000}", ["robot.toml", "digits"]),
         ("[ports]\nkobuki='/dev/a'\nhokuyo='/dev/a'\n", ["robot.toml:3", "ports.hokuyo", "both"]),
     ],
-    ids=str,
+    ids=lambda value: str(value)[:40],
 )
 def test_a_bad_file_is_refused_with_line_key_and_reason(tmp_path, text, words):
     with pytest.raises(BadSetting) as error:

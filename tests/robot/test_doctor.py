@@ -13,7 +13,8 @@ from drivers.kobuki.packets import Bumper, Version
 from drivers.kobuki.session import KobukiSession
 from robot import doctor, ports
 from robot.findings import Verdict, judge_base, judge_laser
-from robot.wire import HOKUYO, KOBUKI, Wire
+from robot.recording import HOKUYO, KOBUKI
+from robot.wire import Wire
 from sim import worlds
 from sim.base import BaseConfig, BatteryConfig
 from sim.errors import Unplugged

@@ -12,8 +12,9 @@ from robot.base import BaseStep
 from robot.config import RobotConfig
 from robot.exchange import Exchange
 from robot.feedback import Condition, Indicators, Light, Play, signal_bytes
+from robot.recording import HOKUYO, KOBUKI
 from robot.safety import Reason
-from robot.wire import HOKUYO, KOBUKI, RecordedHokuyoSession, RecordedKobukiSession, Wire
+from robot.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
 from sim import worlds
 from sim.base import BaseConfig, BatteryConfig
 from sim.errors import Unplugged
