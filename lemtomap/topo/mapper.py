@@ -394,9 +394,9 @@ class TopoMapper:
 
     def view(self, particles: NDArray[np.float64] | None = None) -> MapView:
         """Return an immutable snapshot of the neighbourhood. Raises NotStarted before the first scan."""
+        now, at_id = self.now, self._at.associated_id
         quality = 0.0 if self.lost else self._at.quality(self.config.watch)
-        at_id = self._at.associated_id
-        return self._snapshots.take(self.now, at_id, quality, lost=self.lost, particles=particles)
+        return self._snapshots.take(now, at_id, quality, lost=self.lost, particles=particles)
 
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""
