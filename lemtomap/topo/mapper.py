@@ -1,25 +1,22 @@
 """Topological SLAM, one scan at a time (thesis, Figure 3-6): associate, or be born and join."""
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.displacement import pose_quality
-from lemtomap.errors import LemtomapError
 from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo.config import TopoConfig
-from lemtomap.topo.doubt import COVARIANCE_FLOOR, NOWHERE, relative_to_window
+from lemtomap.topo.doubt import COVARIANCE_FLOOR, NOWHERE
 from lemtomap.topo.events import NavEvent, NothingKnownHere
 from lemtomap.topo.graph import USUAL_SPEED_MPS, Covariance, Edge, chain_covariance, reversed_covariance
 from lemtomap.topo.keeper import PlaceKeeper, Taken
-from lemtomap.topo.kernels import poses as kernels
 from lemtomap.topo.learning import learn
 from lemtomap.topo.levels import Lift, put_on_level
 from lemtomap.topo.local import LocalMap, Standing
-from lemtomap.topo.neighbours import NeighbourFinder, directly_navigable, in_sight
+from lemtomap.topo.localisation import Localisation, Now, Transform
+from lemtomap.topo.neighbours import NeighbourFinder, directly_navigable
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.recognition import (
     Closed,
@@ -37,31 +34,6 @@ from lemtomap.topo.store import TopoStore
 from lemtomap.topo.trail import ScanTrail
 from lemtomap.topo.undoing import take_back
 from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
-
-
-class NotStarted(LemtomapError):
-    """A snapshot was asked for before the first scan."""
-
-
-@dataclass(frozen=True, slots=True)
-class Transform:
-    """How the local grid map transform of the associated node is known (thesis, section 3-3-2)."""
-
-    measured: bool
-    """False: the graph's prediction stands in."""
-    covariance: Covariance
-    """float64 (3, 3), axes of the node."""
-    score: float = 1.0
-    reason: str = ""
-    """Why it is not measured."""
-
-
-@dataclass(slots=True)
-class _Now:
-    """What the last scan said."""
-
-    slam: SlamUpdate
-    grid: GridView
 
 
 class TopoMapper:
@@ -88,10 +60,6 @@ class TopoMapper:
         self.keeper = PlaceKeeper(config, self.graph, recogniser.describe if recogniser else None)
         self.trail = ScanTrail.temporary() if trail is None else trail
         self.level = level
-        self.travelled_m = 0.0
-        """Way of the base since the start, metres."""
-        self.turned_rad = 0.0
-        """Turning of the base since the start, either way."""
         self.lost = False
         """The robot does not know where in the map it is; it maps on in a part of its own."""
         self.known_place = True
@@ -103,41 +71,40 @@ class TopoMapper:
             recogniser.attach(self.graph)
         self._news = News.NONE
         self._sure_m = 0.0
-        self._fit = 1.0
         self._neighbours = NeighbourFinder(config)
-        self._associated_id = 0
-        self._drift: Covariance = np.zeros((3, 3))
-        self._transform = Transform(measured=True, covariance=np.zeros((3, 3)))
-        self._tried_m = 0.0
-        self._now: _Now | None = None
+        self._at = Localisation(config, self.local, self.keeper)
         self._lift: Lift | None = None
         self._snapshots = Snapshots(self.graph, self.local)
 
     @property
     def associated_id(self) -> int:
         """The node the robot is at; 0 before the first scan."""
-        return self._associated_id
+        return self._at.associated_id
+
+    @property
+    def travelled_m(self) -> float:
+        """Way of the base since the start, metres."""
+        return self._at.travelled_m
 
     @property
     def T_node_base(self) -> Pose:  # noqa: N802 - a frame's name
         """Where the robot is relative to the associated node."""
-        return kernels.pose_between(self._pose_of(self._associated_id), self._require().slam.T_grid_base)
+        return self._at.T_node_base
 
     @property
     def transform(self) -> Transform:
         """How the associated node's pose in the window is known."""
-        return self._transform
+        return self._at.transform
 
     @property
     def now(self) -> tuple[SlamUpdate, GridView]:
         """What the last scan said, and the window."""
-        now = self._require()
-        return now.slam, now.grid
+        return self._at.now.slam, self._at.now.grid
 
     @property
     def started(self) -> bool:
         """Whether the robot stands at a node: not before the first scan, nor between two windows."""
-        return self._now is not None
+        return self._at.last is not None
 
     def update(
         self,
@@ -152,21 +119,20 @@ class TopoMapper:
         `points_base` are the scan's hits, float (N, 2), metres, base frame. Without them the window's cells
         must do for localisation data. `fit`: how well the scan fits the window, as a share of what is usual.
         """
-        before, self._now, self._news = self._now, _Now(slam, grid), News.NONE
-        self._fit = fit
+        before, self._at.last, self._news = self._at.last, Now(slam, grid, fit), News.NONE
         self.keeper.observe(slam.T_grid_base, points_base)
         if before is None:
             self._begin()
             slam = replace(slam, step_covariance=NOWHERE)
         else:
-            self._move(before.slam, slam)
+            self._at.move(before.slam)
             if grid is not before.grid:
                 self.local.release_forgotten(grid)
             self._associate_or_create()
         self._recognise()
-        standing = self.local.standings[self._associated_id]
+        standing = self.local.standings[self._at.associated_id]
         seen = standing.seen if standing.anchored else None
-        self.trail.append(slam, self._associated_id, self.T_node_base, seen, points_base)
+        self.trail.append(slam, self._at.associated_id, self.T_node_base, seen, points_base)
         self.store.tick(slam.stamp_s)
 
     # -- the steps of Figure 3-6 ----------------------------------------------------------------------------
@@ -182,14 +148,6 @@ class TopoMapper:
         if known:
             self.lost, self._news = True, News.LOST
 
-    def _move(self, before: SlamUpdate, after: SlamUpdate) -> None:
-        """Let the covariance of T_node_base grow by the motion since the previous scan."""
-        from_base, to_base = before.T_grid_base, after.T_grid_base
-        self._drift = kernels.drifted(self._drift, from_base, to_base, after.step_covariance)
-        self.travelled_m += math.hypot(to_base[0] - from_base[0], to_base[1] - from_base[1])
-        self.turned_rad += abs(math.remainder(to_base[2] - from_base[2], math.tau))
-        self.local.way_m = self.travelled_m
-
     def _associate_or_create(self) -> None:
         """Only a neighbour or a new node can come next, and only one that no wall hides.
 
@@ -197,115 +155,62 @@ class TopoMapper:
         a metre; Kobuki goes closer, hence the look at the window.
         """
         near, far = self.config.association_margin_m, self.config.new_node_distance_m
-        associated_m = self._distance_m(self._associated_id)
+        associated_m = self._at.distance_m(self._at.associated_id)
         nearest_id = self._nearest_neighbour(associated_m - near)
         if nearest_id:
             self._associate(nearest_id)
-        elif associated_m > far or (associated_m > 0.5 * far and not self._sees(self._associated_id)):
+        elif associated_m > far or (associated_m > 0.5 * far and not self._at.sees(self._at.associated_id)):
             self._create()
-        elif not self._transform.measured and self.travelled_m - self._tried_m > self.config.align_again_m:
-            self._align_associated()
+        else:
+            self._at.try_again()
 
     def _nearest_neighbour(self, within_m: float) -> int:
         """Return the nearest neighbour of the associated node in sight; 0 when none is so near."""
         nearest_id, nearest_m = 0, within_m
-        for edge in self.graph.edges_of(self._associated_id):
-            other_id = edge.other(self._associated_id)
+        for edge in self.graph.edges_of(self._at.associated_id):
+            other_id = edge.other(self._at.associated_id)
             if other_id not in self.local.standings:
                 continue
-            other_m = self._distance_m(other_id)
-            if other_m < nearest_m and self._sees(other_id):
+            other_m = self._at.distance_m(other_id)
+            if other_m < nearest_m and self._at.sees(other_id):
                 nearest_id, nearest_m = other_id, other_m
         return nearest_id
 
-    def _distance_m(self, node_id: int) -> float:
-        x, y, _ = (self._pose_of(node_id) - self._require().slam.T_grid_base).tolist()
-        return math.hypot(x, y)
-
-    def _sees(self, node_id: int) -> bool:
-        now = self._require()
-        return in_sight(now.grid, now.slam.T_grid_base, self._pose_of(node_id), self.config)
-
-    def _pose_of(self, node_id: int) -> Pose:
-        return self.local.standings[node_id].T_grid_node
-
     def _associate(self, node_id: int) -> None:
         """Make an existing node the associated node; find where it stands if the window does not know."""
-        self._associated_id = node_id
         node = self.graph.node(node_id)
         self.graph.put_node(replace(node, visits=node.visits + 1))
         self._take_places()
         self.keeper.review(node_id)
-        self._align_associated()
-        for seam in self._neighbours.seams_at(node_id, self.graph, self.local, self._require().grid):
+        self._at.stand_at(node_id)
+        for seam in self._neighbours.seams_at(node_id, self.graph, self.local, self._at.now.grid):
             self.graph.add_edge(seam)
         self._news = News.NODE
 
     def _create(self) -> None:
         """Make a node here, with its odometry edge and all near-neighbour edges that help."""
-        previous_id, T_previous_new, covariance = self._associated_id, self.T_node_base, self._drift
+        previous_id, T_previous_new = self._at.associated_id, self._at.T_node_base
+        covariance = self._at.covariance + COVARIANCE_FLOOR
         node_id = self._birth()
-        covariance = covariance + COVARIANCE_FLOOR
         self.graph.add_edge(Edge(0, previous_id, node_id, T_previous_new, covariance, EdgeType.ODOMETRY))
         self._take_places()
         self.local.settle(node_id)
-        self._anchor_beside(node_id)
-        here = node_id, self.graph, self.local, self._require().grid
+        self._at.anchor_beside()
+        here = node_id, self.graph, self.local, self._at.now.grid
         for edge in chain(self._neighbours.edges_for(*here), self._neighbours.seams_at(*here)):
             self.graph.add_edge(edge)
         self._news = News.NODE
 
     def _birth(self) -> int:
-        now = self._require()
-        area_id = self.graph.node(self._associated_id).area_id if self._associated_id else 1
-        node = self.graph.add_node(area_id=area_id, level=self.level, created_s=now.slam.stamp_s)
-        T_grid_node = np.array(now.slam.T_grid_base, dtype=np.float64)
-        covariance = relative_to_window(now.slam)
-        self.local.anchor(node.node_id, T_grid_node, covariance, born=True, seen=COVARIANCE_FLOOR)
-        self.keeper.due(node.node_id)
-        self._associated_id = node.node_id
-        self._drift = np.zeros((3, 3))
-        self._transform = Transform(measured=True, covariance=covariance)
-        return node.node_id
-
-    # -- the local grid map transform -----------------------------------------------------------------------
-
-    def _align_associated(self) -> None:
-        """Measure where the associated node stands, unless the window has known it all along."""
-        node_id = self._associated_id
-        standing = self.local.standings[node_id]
-        self._tried_m = self.travelled_m
-        if standing.anchored:
-            self._transform = Transform(measured=True, covariance=standing.covariance)
-        else:
-            self._transform = self._measured(node_id)
-            if not self._transform.measured:
-                self.local.doubt(node_id)
-        standing = self.local.standings[node_id]
-        seen = relative_to_window(self._require().slam)
-        self._drift = chain_covariance(standing.covariance, self.T_node_base, seen)
-        self.local.settle(node_id)
-
-    def _measured(self, node_id: int) -> Transform:
-        """Match one node's localisation data with the window and anchor it there when it fits."""
-        standing = self.local.standings[node_id]
-        match = self.keeper.align(node_id, standing, self._require().grid)
-        if match is None:
-            return Transform(measured=False, covariance=standing.covariance, score=0.0, reason="no data")
-        if match.refused:
-            return Transform(False, standing.covariance, match.score, match.refused)
-        self.local.anchor(node_id, match.T_grid_node, match.covariance)
-        return Transform(measured=True, covariance=match.covariance, score=match.score)
-
-    def _anchor_beside(self, node_id: int) -> None:
-        """Match the nearest well-predicted node that the window does not hold, so that edges may join it."""
-        at, config = self._require().slam.T_grid_base, self.config
-        beside_id = self.local.predicted_near(at, config.near_neighbour_max_m, config.implicit_sigma_m)
-        if beside_id and self._measured(beside_id).measured:
-            self.local.settle(node_id)
+        before_id, stamp_s = self._at.associated_id, self._at.now.slam.stamp_s
+        area_id = self.graph.node(before_id).area_id if before_id else 1
+        node_id = self.graph.add_node(area_id=area_id, level=self.level, created_s=stamp_s).node_id
+        self._at.begin_at(node_id)
+        self.keeper.due(node_id)
+        return node_id
 
     def _take_places(self) -> None:
-        now = self._require()
+        now = self._at.now
         self._tell(self.keeper.take_ripe(self.local, now.slam.T_grid_base, now.grid, now.slam.stamp_s))
 
     def _tell(self, taken: list[Taken]) -> None:
@@ -333,7 +238,7 @@ class TopoMapper:
                     self.found(known=False)
 
     def _situation(self) -> Situation:
-        now, here_id, sure = self._require(), self._associated_id, self.local.sure()
+        now, here_id, sure = self._at.now, self._at.associated_id, self.local.sure()
         if self._news is News.NODE and not self.lost and here_id in sure:
             self._sure_m = self.travelled_m
         here = self.local.standings[here_id]
@@ -343,7 +248,7 @@ class TopoMapper:
             here.covariance,
             now.slam.T_grid_base,
             self.travelled_m,
-            self.turned_rad,
+            self._at.turned_rad,
             now.grid,
             self.travelled_m - self._sure_m,
             sure,
@@ -365,14 +270,14 @@ class TopoMapper:
         found = [each.found for each in closed.closures]
         for each in found:
             self._anchor_found(each)
-        if not self.local.standings[self._associated_id].sure:
-            nearest = min(found, key=self._gap_m)
+        if not self.local.standings[self._at.associated_id].sure:
+            nearest = min(found, key=lambda each: self._at.gap_m(each.T_grid_node))
             self._stand_at(nearest)
             self._anchor_found(nearest)
 
     def _join(self, located: Located, recogniser: Recogniser) -> None:
         """Join the robot's part of the map to where it was found, and stand there if it is near."""
-        found, here_id = located.found, self._associated_id
+        found, here_id = located.found, self._at.associated_id
         here = self.local.standings[here_id]
         T_here_node = between(here.T_grid_node, found.T_grid_node)
         doubt = reversed_covariance(here.T_grid_node, here.covariance)
@@ -390,18 +295,13 @@ class TopoMapper:
 
         From further off an odometry edge would begin there that nobody has driven.
         """
-        if self._gap_m(found) <= self.config.new_node_distance_m:
+        if self._at.gap_m(found.T_grid_node) <= self.config.new_node_distance_m:
             self.relocate(found.node_id, found.T_grid_node, found.covariance)
 
     def _anchor_found(self, found: Found) -> None:
         self.local.anchor_found(found.node_id, found.T_grid_node, found.covariance)
 
-    def _gap_m(self, found: Found) -> float:
-        """Return how far the robot is from a node that was found."""
-        x, y, _ = (found.T_grid_node - self._require().slam.T_grid_base).tolist()
-        return math.hypot(x, y)
-
-    # -- closures and components ----------------------------------------------------------------------------
+    # -- closures and parts of the map ----------------------------------------------------------------------
 
     def standing(self, node_id: int) -> Standing | None:
         """Return where a node of the neighbourhood stands in the window, None beyond it."""
@@ -420,24 +320,19 @@ class TopoMapper:
             T_grid_target = compose(source.T_grid_node, T_source_target)
             joined = chain_covariance(source.covariance, edge.T_source_target, covariance)
             self.local.anchor(target_id, T_grid_target, joined)
-            if directly_navigable(self._require().grid, source.T_grid_node, T_grid_target, self.config):
+            if directly_navigable(self._at.now.grid, source.T_grid_node, T_grid_target, self.config):
                 edge = replace(edge, time_s=edge.length_m / USUAL_SPEED_MPS)
         edge = self.graph.add_edge(edge)
-        self.local.settle(self._associated_id)
+        self.local.settle(self._at.associated_id)
         return edge
 
     def revoke(self, *edge_ids: int) -> None:
         """Take back closures, with what they made the window believe and what grew from them since."""
         if not take_back(self.graph, self.local, edge_ids, COVARIANCE_FLOOR):
             return
-        self._associated_id = self._own_nearest() or self._associated_id
-        self.local.settle(self._associated_id)
-        self._align_associated()
-
-    def _own_nearest(self) -> int:
-        """Return the nearest node born in this window, 0 when it holds none."""
-        own = [n for n, standing in self.local.standings.items() if standing.born and standing.anchored]
-        return min(own, key=self._distance_m, default=0)
+        node_id = self._at.own_nearest() or self._at.associated_id
+        self.local.settle(node_id)
+        self._at.stand_at(node_id)
 
     def change_level(self, level: int) -> None:
         """Say that the robot is on another level now (a lift, the end of a ramp).
@@ -446,14 +341,15 @@ class TopoMapper:
         with a node that an odometry edge, the lift or ramp, joins to the last one. Near-neighbour edges and
         closures join one level only.
         """
-        if level != self.level and self._now is not None:
-            self._lift = Lift.left(self._associated_id, self.T_node_base, self._drift, self._now.slam)
+        if level != self.level and self._at.last is not None:
+            at = self._at
+            self._lift = Lift.left(at.associated_id, at.T_node_base, at.covariance, at.now.slam)
             self.lose()
         self.level = level
 
     def _leave_lift(self, lift: Lift) -> None:
         node_id, self._lift = self._birth(), None
-        self.graph.add_edge(lift.edge_to(node_id, self._require().slam, COVARIANCE_FLOOR))
+        self.graph.add_edge(lift.edge_to(node_id, self._at.now.slam, COVARIANCE_FLOOR))
         self.local.settle(node_id)
         self._news = News.WINDOW
 
@@ -469,12 +365,13 @@ class TopoMapper:
         The next scan, from a window of its own, begins a new part of the graph, joined to nothing until a
         closure joins it to the rest.
         """
-        if self._now is None:
+        now = self._at.last
+        if now is None:
             return
-        self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
+        self._tell(self.keeper.take_all(self.local.standings, now.grid, now.slam.stamp_s))
         self.keeper.forget_window()
         self.local.standings.clear()
-        self._now = None
+        self._at.last = None
 
     def found(self, *, known: bool = True) -> None:
         """Say that the robot knows its place again, or that this must be a place not mapped yet."""
@@ -483,8 +380,7 @@ class TopoMapper:
     def relocate(self, node_id: int, T_grid_node: Pose, covariance: Covariance) -> None:
         """Make a known node the associated one because it was recognised in the window."""
         self.local.anchor(node_id, np.array(T_grid_node), covariance)
-        self._associated_id = node_id
-        self._align_associated()
+        self._at.stand_at(node_id)
 
     # -- what others say and see ----------------------------------------------------------------------------
 
@@ -493,30 +389,20 @@ class TopoMapper:
         if isinstance(event, NothingKnownHere):
             if self.lost:
                 self.found(known=False)
-        elif self._now is not None:
-            learn(event, self.graph, self._associated_id, self.T_node_base)
+        elif self._at.last is not None:
+            learn(event, self.graph, self._at.associated_id, self.T_node_base)
 
     def view(self, particles: NDArray[np.float64] | None = None) -> MapView:
         """Return an immutable snapshot of the neighbourhood. Raises NotStarted before the first scan."""
-        now, at_id = self.now, self._associated_id
-        return self._snapshots.take(now, at_id, self._quality(), lost=self.lost, particles=particles)
-
-    def _quality(self) -> float:
-        """Return how likely T_node_base is right, 0 to 1; nothing is while the robot is lost."""
-        if self.lost:
-            return 0.0
-        born, measured = self.local.standings[self._associated_id].born, self._transform.measured
-        return pose_quality(self._drift, self._fit, born=born, measured=measured, config=self.config.watch)
+        now, at_id = self.now, self._at.associated_id
+        quality = 0.0 if self.lost else self._at.quality(self.config.watch)
+        return self._snapshots.take(now, at_id, quality, lost=self.lost, particles=particles)
 
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""
         try:
-            if self._now is not None:
-                self._tell(self.keeper.take_all(self.local.standings, self._now.grid, self._now.slam.stamp_s))
+            now = self._at.last
+            if now is not None:
+                self._tell(self.keeper.take_all(self.local.standings, now.grid, now.slam.stamp_s))
         finally:
             self.store.close()
-
-    def _require(self) -> _Now:
-        if self._now is None:
-            raise NotStarted("the mapper has seen no scan yet")
-        return self._now

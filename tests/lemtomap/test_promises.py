@@ -108,6 +108,27 @@ def test_a_robot_carried_to_where_it_looks_different_says_so_at_once_and_is_foun
     assert len(building.topo.graph.reach(building.topo.associated_id, 1e9)) == building.store.count("node")
 
 
+@pytest.mark.parametrize("watched", [True, False])
+def test_wheels_that_leap_are_a_moved_robot_except_on_a_recorded_drive(building, watched):
+    """Whoever carried the robot would have stopped the recording; a logger that lost messages did not."""
+    mapper = Mapper(lambda: WindowMatcher(SlamConfig()), building.topo, watched=watched)
+    leap = np.zeros(3)
+    displaced = []
+    for k, (truth, odometry, scan) in enumerate(drive(LAPS[:80], WALLS, seed=2)):
+        if k == 50:
+            here = odometry.T_odom_base
+            leap = compose(compose(here, [0.0, 0.0, 1.0]), inverse(here))
+        told = replace(odometry, T_odom_base=compose(leap, odometry.T_odom_base))
+        mapped = mapper.update(scan, told)
+        displaced += [k] if mapped.displaced else []
+        if k == 0:
+            start = between(building.topo.now[0].T_grid_base, truth)
+    assert displaced == ([50] if watched else [])
+    if not watched:
+        off = between(compose(building.topo.now[0].T_grid_base, start), truth)
+        assert np.hypot(off[0], off[1]) < 0.1
+
+
 def test_a_robot_lifted_for_a_moment_goes_on_and_one_lifted_for_long_is_lost(building):
     scans = list(drive(LAPS[:60], WALLS, seed=2))
     for _, odometry, scan in scans[:50]:

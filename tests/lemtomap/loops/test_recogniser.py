@@ -7,6 +7,8 @@ import pytest
 
 from lemtomap.se2 import between, compose, pose
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.loops import LoopRecogniser
+from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.recognition import (
     Closed,
@@ -188,3 +190,14 @@ def test_a_situation_tells_how_far_the_robot_went_since_it_was_sure_of_its_node(
     assert back.associated_id in oracle.heard[-1].measured
     nodes = [each for each in oracle.heard if each.news is News.NODE]
     assert [each.here_id for each in nodes] == list(range(2, back.associated_id + 1))
+
+
+def test_the_index_is_filled_a_slice_at_a_time_until_it_has_caught_up(tmp_path, monkeypatch):
+    calls = []
+    monkeypatch.setattr(PlaceIndex, "catch_up", lambda _: calls.append(1) or len(calls) >= 3)
+    store = TopoStore.create(tmp_path / "m.lemto", durable=False)
+    mapper = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
+    for k in range(8):
+        mapper.update(said(0.2 * k, pose(0.0, 0.0, 0.0)), GRID)
+    assert len(calls) == 3
+    mapper.close()

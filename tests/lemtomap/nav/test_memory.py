@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from lemtomap import se2
 from lemtomap.nav import kernels
 from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore.aside import FOLLOWED_M, Aside
+from lemtomap.nav.explore.kernels import remember
 from lemtomap.nav.explore.memory import SeenMemory
 
 RES, CELLS = 0.05, 200
@@ -90,3 +92,15 @@ def test_ground_at_the_end_of_a_long_chain_is_known_only_where_its_error_leaves_
     only._pictures[2] = None
     only.take(dark, {2: NODES[1]}, se2.pose(90.0, 0.0, 0.0))
     assert np.flatnonzero(only.recall(dark).any(axis=1))[0] * RES > 4.1
+
+
+@pytest.mark.parametrize(("row", "col"), [(20, 20), (21, 20), (18, 20), (20, 21), (20, 18)])
+def test_ground_counts_as_seen_only_where_its_middle_and_all_four_sides_are_known(row, col):
+    state = np.full((40, 40), kernels.FREE, dtype=np.uint8)
+    state[row, col] = kernels.UNKNOWN
+    seen = np.zeros((1, 1), dtype=np.uint8)
+    remember(state, 20.0, 20.0, 0.0, 4.0, seen)
+    assert seen[0, 0] == 0
+    state[row, col] = kernels.FREE
+    remember(state, 20.0, 20.0, 0.0, 4.0, seen)
+    assert seen[0, 0] == 1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lemtomap.topo.loops import cells
+from lemtomap.topo import cells
 
 
 @pytest.fixture

@@ -4,7 +4,8 @@ import pytest
 from lemtomap.se2 import between, compose, pose
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.local import LocalMap, Standing
-from lemtomap.topo.mapper import NotStarted, TopoMapper
+from lemtomap.topo.localisation import NotStarted
+from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.reader import TopoReader
 from lemtomap.topo.store import TopoStore
