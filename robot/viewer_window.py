@@ -13,6 +13,7 @@ from contextlib import suppress
 from robot.viewer_command import Process, end_viewer, start_viewer
 
 BACKLOG_BYTES = 32 << 20  # some ten minutes of a run: a window that takes nothing for so long is stuck
+KILLED = 128  # codes from here on stand for a signal
 MEMORY_LIMIT = "1GB"  # its own default is 75 % of the machine
 
 
@@ -47,7 +48,8 @@ class ViewerWindow:
             self._write()
         except OSError:  # its end of the pipe is closed
             code = self._process.poll()
-            how = f"ended with code {code}" if code is not None and code > 0 else "was closed"
+            failed = code is not None and 0 < code < KILLED
+            how = f"ended with code {code}" if failed else "was closed"
             self._end(f"the live view {how}; the run goes on")
             return
         if sum(len(piece) for piece in self._waiting) > self._backlog_bytes:
