@@ -13,7 +13,14 @@ from robot.mcap_file import McapFile
 from robot.parts import PARTS, parts_of
 from robot.recorded import Gap, Recording
 from robot.recording import HOKUYO, KOBUKI, OPENED, UP, Call, Entry, Recorder
-from tools.checks.mutations import CHUNK, MAGIC_BYTES, chunk_content, chunk_payload, mcap_bytes, mcap_records
+from tools.checks.mcap_damage import (
+    CHUNK,
+    MAGIC_BYTES,
+    chunk_content,
+    chunk_payload,
+    mcap_bytes,
+    mcap_records,
+)
 
 SMALL_LIMIT = 400_000
 OPENING = [

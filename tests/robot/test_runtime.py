@@ -19,6 +19,7 @@ from robot.doctor import examine
 from robot.findings import Verdict
 from robot.missions import Idle, parse_mission
 from robot.onlooker import Onlooker
+from robot.recorded import Recording
 from robot.recording import Recorder
 from robot.replay import replay_events
 from robot.runtime import Ports, Runtime
@@ -54,7 +55,7 @@ def test_the_robot_maps_and_drives_in_real_time_and_leaves_nothing_behind(tmp_pa
     assert runtime.core.mapping.scans > 50
     assert process.num_fds() <= before[0] + 1
     assert threading.active_count() == before[1]
-    samples = [event for _, told in replay_events(tmp_path / "run.mcap") for event in told.base]
+    samples = [event for _, told in replay_events(Recording.open(tmp_path)) for event in told.base]
     assert len(samples) > 400
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from tools.checks.fuzz_readers import KINDS, judge, make_case
 from tools.checks.isolation import Outcome
-from tools.checks.mutations import MCAP, mcap_bytes, mcap_records
+from tools.checks.mcap_damage import MCAP, mcap_bytes, mcap_records
 
 LINE = "lemtomap: hall.clf:3: 'x' stands where a number belongs\n"
 

@@ -25,7 +25,9 @@ from robot.config import RobotConfig
 from robot.warmup import warm_up
 from tools.checks import inputs
 from tools.checks.isolation import Limits, Outcome, Task, run_all
-from tools.checks.mutations import BYTES, GZIP, MCAP, SQLITE, TEXT, XZ, YAML, Mutation
+from tools.checks.mcap_damage import MCAP
+from tools.checks.mutations import BYTES, GZIP, TEXT, XZ, YAML, Mutation
+from tools.checks.sqlite_damage import SQLITE
 
 OUT = "out"
 REFUSED = 2

@@ -1,4 +1,4 @@
-"""Damage to files: of bytes, of text, of packed files, of MCAP records and of SQLite maps.
+"""Damage to files: of bytes, of text and of packed files; recordings and maps have modules of their own.
 
 Every mutation takes the sound file and a random generator and returns the damaged file.
 """
@@ -8,14 +8,7 @@ import gzip
 import lzma
 import random
 import re
-import sqlite3
-import struct
-import tempfile
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from pathlib import Path
-
-import zstandard
+from collections.abc import Callable
 
 Mutation = Callable[[bytes, random.Random], bytes]
 
@@ -34,8 +27,6 @@ JUNK = (
 )
 BOMB_MEMBER = 256 * 2**20
 BOMB_MEMBERS = 16
-CHUNK, MESSAGE = 0x06, 0x05
-MAGIC_BYTES = 8
 
 
 # ---- bytes ----
@@ -211,189 +202,3 @@ XZ: tuple[Mutation, ...] = (
     *[repacked(lambda data: lzma.compress(data, preset=0), lzma.decompress)] * 8,
     bomb(lambda data: lzma.compress(data, preset=0)),
 )
-
-
-# ---- MCAP ----
-
-Record = tuple[int, bytes]
-
-
-def mcap_records(data: bytes) -> list[Record]:
-    """Return (opcode, content) of records that stand one after another, without the file's magic."""
-    records, at = [], 0
-    while at + 9 <= len(data):
-        opcode, length = struct.unpack_from("<BQ", data, at)
-        records.append((opcode, data[at + 9 : at + 9 + length]))
-        at += 9 + length
-    return records
-
-
-def mcap_bytes(records: Sequence[Record]) -> bytes:
-    """Return the records as they stand in a file."""
-    return b"".join(struct.pack("<BQ", opcode, len(content)) + content for opcode, content in records)
-
-
-def chunk_payload(content: bytes) -> bytes:
-    """Return the records inside a zstd chunk's content."""
-    (name,) = struct.unpack_from("<I", content, 28)
-    (size,) = struct.unpack_from("<Q", content, 16)
-    return zstandard.decompress(content[32 + name + 8 :], size)
-
-
-def chunk_content(old: bytes, payload: bytes, *, compression: bytes = b"zstd", crc: int = 0) -> bytes:
-    """Return a chunk's content with another payload; crc 0: not checked."""
-    packed = zstandard.compress(payload)
-    head = old[:16] + struct.pack("<QII", len(payload), crc, len(compression)) + compression
-    return head + struct.pack("<Q", len(packed)) + packed
-
-
-def _record_changed(records: list[Record], rng: random.Random) -> None:
-    """Lose, repeat, exchange, rename or damage one record, or put a huge number into it."""
-    at = rng.randrange(len(records))
-    opcode, content = records[at]
-    kind = rng.randrange(7)
-    if kind == 0:
-        del records[at]
-    elif kind == 1:
-        records[at:at] = [records[at]] * rng.choice((1, 50))
-    elif kind == 2:
-        other = rng.randrange(len(records))
-        records[at], records[other] = records[other], records[at]
-    elif kind == 3:
-        records[at] = (rng.randrange(256), content)
-    elif kind == 4 and len(content) >= 8:
-        where = (
-            rng.randrange(len(content) - 7) if rng.random() < 0.5 else rng.randrange(0, len(content) - 7, 2)
-        )
-        number = rng.choice((0, 1, 2**31, 2**32 - 1, 2**40, 2**63 - 1, 2**64 - 1))
-        records[at] = (opcode, content[:where] + struct.pack("<Q", number) + content[where + 8 :])
-    else:
-        records[at] = (opcode, rng.choice(BYTES)(content, rng) if content else b"\x00" * 40)
-
-
-def mcap_record(data: bytes, rng: random.Random) -> bytes:
-    """Damage records of the file."""
-    records = mcap_records(data[MAGIC_BYTES:])
-    for _ in range(rng.choice((1, 1, 3))):
-        _record_changed(records, rng)
-    return data[:MAGIC_BYTES] + mcap_bytes(records) + data[:MAGIC_BYTES]
-
-
-def mcap_message(data: bytes, rng: random.Random) -> bytes:
-    """Damage records inside a chunk, and pack it so that nothing but what they say is wrong."""
-    records = mcap_records(data[MAGIC_BYTES:])
-    chunks = [index for index, (opcode, _) in enumerate(records) if opcode == CHUNK]
-    at = rng.choice(chunks)
-    inner = mcap_records(chunk_payload(records[at][1]))
-    for _ in range(rng.choice((1, 5, 40))):
-        if inner:
-            _record_changed(inner, rng)
-    records[at] = (CHUNK, chunk_content(records[at][1], mcap_bytes(inner)))
-    return data[:MAGIC_BYTES] + mcap_bytes(records) + data[:MAGIC_BYTES]
-
-
-def mcap_chunk_lies(data: bytes, rng: random.Random) -> bytes:
-    """Let a chunk tell a wrong compression, checksum or size."""
-    records = mcap_records(data[MAGIC_BYTES:])
-    at = rng.choice([index for index, (opcode, _) in enumerate(records) if opcode == CHUNK])
-    old = records[at][1]
-    kind = rng.randrange(3)
-    if kind == 0:
-        new = chunk_content(
-            old, chunk_payload(old), compression=rng.choice((b"lz4", b"", b"none", b"\xff", b"zip"))
-        )
-    elif kind == 1:
-        new = chunk_content(old, chunk_payload(old), crc=rng.randrange(1, 2**32))
-    else:
-        new = old[:16] + struct.pack("<Q", rng.choice((0, 1, 2**31, 2**40, 2**63))) + old[24:]
-    records[at] = (CHUNK, new)
-    return data[:MAGIC_BYTES] + mcap_bytes(records) + data[:MAGIC_BYTES]
-
-
-MCAP: tuple[Mutation, ...] = (*BYTES, *[mcap_record, mcap_message] * 2, mcap_chunk_lies)
-
-
-# ---- SQLite ----
-
-CELLS = (
-    None, 0, -1, 1, 2**62, -(2**62), 1e308, -1e308, float("inf"), 1e12, "", "nan", "x" * 5000, "\x1b[2J\x00",
-    b"", b"\x00", b"\xff" * 24, b"\x00" * 4000,
-)  # fmt: skip
-SCHEMAS = (
-    "DROP TABLE {table}",
-    "DELETE FROM {table}",
-    "DELETE FROM {table} WHERE rowid = {row}",
-    "ALTER TABLE {table} RENAME TO other",
-    "ALTER TABLE {table} RENAME COLUMN {column} TO other",
-    "CREATE TRIGGER t AFTER UPDATE ON {table} BEGIN DELETE FROM {table}; END",
-    "CREATE TRIGGER t AFTER INSERT ON {table} BEGIN DELETE FROM {table}; END",
-    "CREATE TABLE stranger AS SELECT * FROM {table}",
-    "PRAGMA user_version = {row}",
-    "PRAGMA application_id = {row}",
-    "UPDATE {table} SET {column} = rowid",
-    "INSERT INTO {table}(rowid) VALUES (987654321)",
-    "INSERT INTO {table} SELECT * FROM {table} LIMIT 1",
-)
-
-
-def _edited(data: bytes, edit: Callable[[sqlite3.Connection], None]) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "map"
-        path.write_bytes(data)
-        connection = sqlite3.connect(path, isolation_level=None)
-        connection.execute("PRAGMA ignore_check_constraints = ON")
-        with suppress(sqlite3.Error):  # some of it even SQLite refuses
-            edit(connection)
-        connection.close()
-        return path.read_bytes()
-
-
-def _anywhere(connection: sqlite3.Connection, rng: random.Random) -> tuple[str, str, int]:
-    """Return a table, a column of it and the id of a row."""
-    tables = [name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
-    table = rng.choice(tables)
-    columns = [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
-    rows = [row for (row,) in connection.execute(f"SELECT rowid FROM {table}")]  # noqa: S608 - our own table
-    return table, rng.choice(columns), rng.choice(rows or [1])
-
-
-def sqlite_cell(data: bytes, rng: random.Random) -> bytes:
-    """Put strange values into cells."""
-
-    def edit(connection: sqlite3.Connection) -> None:
-        for _ in range(rng.choice((1, 1, 3))):
-            table, column, row = _anywhere(connection, rng)
-            statement = f"UPDATE {table} SET {column} = ? WHERE rowid = ?"  # noqa: S608 - our own table
-            connection.execute(statement, (rng.choice(CELLS), row))
-
-    return _edited(data, edit)
-
-
-def sqlite_blob(data: bytes, rng: random.Random) -> bytes:
-    """Damage the bytes of a measured thing."""
-
-    def edit(connection: sqlite3.Connection) -> None:
-        table, column = rng.choice((("edge", "measure"), ("place", "boundary"), ("place", "descriptor")))
-        cells = connection.execute(f"SELECT rowid, {column} FROM {table}").fetchall()  # noqa: S608
-        row, blob = rng.choice(cells)
-        damaged = rng.choice(BYTES)(blob, rng)
-        if rng.random() < 0.4 and len(blob) >= 8:
-            at = rng.randrange(0, len(blob) - 3, 4)
-            number = struct.pack("<f", rng.choice((float("nan"), float("inf"), 1e30, -1e12)))
-            damaged = blob[:at] + number + blob[at + 4 :]
-        connection.execute(f"UPDATE {table} SET {column} = ? WHERE rowid = ?", (damaged, row))  # noqa: S608
-
-    return _edited(data, edit)
-
-
-def sqlite_schema(data: bytes, rng: random.Random) -> bytes:
-    """Change what the file is made of."""
-
-    def edit(connection: sqlite3.Connection) -> None:
-        table, column, row = _anywhere(connection, rng)
-        connection.execute(rng.choice(SCHEMAS).format(table=table, column=column, row=row))
-
-    return _edited(data, edit)
-
-
-SQLITE: tuple[Mutation, ...] = (*BYTES, *[sqlite_cell] * 4, sqlite_blob, sqlite_blob, *[sqlite_schema] * 3)
