@@ -146,8 +146,10 @@ class Recorder:
         self.derived(RUN_TOPIC, self._stamp_ns * 1e-9, {**self._about, "part": self.parts.number})
 
     def _end_part(self) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.close()
+        try:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+        finally:
+            self._file.close()
 
     def _roll_when_full(self) -> None:
         if self._file.tell() < self.parts.part_bytes:

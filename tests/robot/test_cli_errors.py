@@ -39,13 +39,17 @@ def write(path: Path, content: str | bytes) -> Path:
     return path
 
 
+FIRST = SOUND.splitlines()[0]
 BAD_LOGS = {
     "empty.clf": ("", "empty"),
-    "cut.clf": (SOUND[:-200], ":3: .*cut"),
-    "nan.clf": (SOUND.replace(" 0 0 0 0 ", " 0 0 0 nan ", 1), ":1: 'nan' is not a finite number"),
-    "text.clf": (SOUND.replace("2.5", "2.5m", 1), ":1: '2.5m' stands where a number belongs"),
-    "foreign.clf": ("# a poem\nnothing of ours\n", "no FLASER line"),
-    "cut.dat": (DAT + DAT[:-300], ":2: .*cut"),
+    "cut.clf": (SOUND.splitlines()[-1][:-200], ":1: .*cut"),
+    "nan.clf": (
+        SOUND.splitlines()[0].replace(" 0 0 0 0 ", " 0 0 0 nan ", 1),
+        ":1: 'nan' is not a finite number",
+    ),
+    "text.clf": (FIRST.replace("2.5", "2.5m", 1), ":1: '2.5m' stands where a number"),
+    "foreign.clf": ("# a poem\nnothing of ours\n", "no FLASER, ROBOTLASER1 or RAWLASER1 line"),
+    "cut.dat": (DAT[:-300], ":1: .*cut"),
     "text.dat": (DAT.replace("1000", "x", 1), ":1: 'x' stands where a number belongs"),
     "cut.clf.gz": (gzip.compress(SOUND.encode())[:-20], "not a whole .gz file"),
     "false.clf.xz": ("not packed at all", "xz"),

@@ -25,7 +25,7 @@ def test_trajectory_has_one_tum_line_per_scan_in_order_even_when_stamps_go_back(
 
 def test_grid_is_what_map_server_reads(tmp_path):
     occupancy = np.array([[-1, 0, 100], [25, 50, 65]], dtype=np.int8)  # row 0 lies lowest
-    outputs.write_grid(tmp_path, GridView(0.0, occupancy, 0.05, (-1.5, 2.0)))
+    outputs.write_grid(tmp_path, GridView(0.0, occupancy, 0.05, (-1.5, 2.0)), np.zeros(3))
     data = (tmp_path / "grid.pgm").read_bytes()
     assert data == b"P5\n3 2\n255\n" + bytes([254, 205, 0, 205, 254, 0])
     told = yaml.safe_load((tmp_path / "grid.yaml").read_text())

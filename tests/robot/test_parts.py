@@ -65,7 +65,7 @@ def test_a_bad_limit_is_refused_before_anything_moves(tmp_path, capsys):
 
 
 def test_the_view_goes_on_in_parts_that_each_can_be_opened(tmp_path):
-    viewer = Viewer(tmp_path / "run.rrd", live=False, limit_bytes=PARTS * 1000)
+    viewer = Viewer(tmp_path / "run.rrd", print, live=False, limit_bytes=PARTS * 1000)
     viewer.show_world([np.array([[0.0, 0.0], [5.0, 5.0]])])
     for step in range(40 * PARTS):
         viewer.show_robot(10.0 * step, np.array([0.1 * step, 0.0, 0.0]), np.zeros((700, 2)))

@@ -128,7 +128,7 @@ def test_scans_that_the_mapper_left_out_are_left_out_again(run, tmp_path):
     settings = settings_for(recording, None, None)
     core = build_core(settings.config, tmp_path / "map.lemto", seed=settings.seed, durable=False)
     replay_map(recording, core, as_then=True)
-    mapped = [mapped.stamp_s for mapped in core.exchange.mapped.drain()]
+    mapped = [mapped.stamp_s for mapped in core.exchange.mapped_scans.drain()]
     core.close()
     assert mapped == [scan.stamp_s for scan in kept]
 

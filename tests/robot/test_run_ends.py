@@ -365,7 +365,7 @@ def test_a_failed_start_leaves_no_folder(tmp_path, monkeypatch):
 
 def test_a_commit_asks_for_room_first(tmp_path):
     core, asked = build_core(RobotConfig(), tmp_path / "map.lemto"), []
-    store = core.mapping.mapper.store
+    store = core.mapping.mapper.topo.store
     store.before_commit = lambda: asked.append(store._db.in_transaction)
     store.add_node()
     store.commit()

@@ -23,6 +23,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from robot.child import python
 from tools.checks.mutants import Mutant, random_mutants
 from tools.checks.safety_mutants import MUTANTS as SAFETY_MUTANTS
 
@@ -79,7 +80,7 @@ class Sandbox:
                 shutil.copy2(self._root / mutant.path, target)  # with its time: compiled code fits again
 
     def _run(self, tests: list[str]) -> str:
-        command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
+        command = python("-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests)
         environment = dict(os.environ, PYTHONPATH=str(self.folder), PYTHONDONTWRITEBYTECODE="1")
         try:
             run = subprocess.run(  # noqa: S603 -- our own tests
