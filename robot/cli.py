@@ -13,10 +13,12 @@ import typer
 
 from drivers.errors import DriverError
 from lemtomap.errors import LemtomapError
+from lemtomap.topo.naming import shown
 from robot import cli_doctor, cli_drive, cli_file, cli_map
 from robot.cli_help import Interrupted
 from sim.errors import SimError
 
+LINE = 2000  # characters that a person is told at once
 INTERRUPTED = 130  # as shells say it: 128 and SIGINT
 DEBUG_VARIABLE = "LEMTOMAP_DEBUG"  # set: show the traceback of an unexpected error
 
@@ -85,8 +87,8 @@ def _usage(error: typer.TyperException) -> int:
 
 
 def _fail(code: int, text: str) -> int:
-    """Write one line to stderr."""
-    line = " ".join(text.split())
+    """Write one line to stderr, nothing in it that a terminal would obey."""
+    line = shown(" ".join(text.split()), LINE)
     with contextlib.suppress(BrokenPipeError):
         sys.stderr.write(f"lemtomap: {line}\n")
     return code
