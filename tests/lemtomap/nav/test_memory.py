@@ -1,8 +1,10 @@
 """What exploration remembers of ground that the window forgot."""
 
+import zlib
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from lemtomap import se2
 from lemtomap.nav import kernels
@@ -90,3 +92,29 @@ def test_ground_at_the_end_of_a_long_chain_is_known_only_where_its_error_leaves_
     only._pictures[2] = None
     only.take(dark, {2: NODES[1]}, se2.pose(90.0, 0.0, 0.0))
     assert np.flatnonzero(only.recall(dark).any(axis=1))[0] * RES > 4.1
+
+
+class File:
+    """A map that holds one picture, whatever is asked for."""
+
+    def __init__(self, picture):
+        self._picture = picture
+
+    def ground_seen(self, node_id):  # noqa: ARG002
+        return self._picture
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [b"", b"picture", zlib.compress(bytes(287)), zlib.compress(b"\xff" * 289), zlib.compress(bytes(10**8))],
+    ids=["empty", "foreign", "short", "long", "bomb"],
+)
+def test_a_picture_that_is_none_tells_nothing_of_the_ground(picture):
+    dark = window(kernels.UNKNOWN)
+
+    def seen(picture):
+        memory = SeenMemory()
+        memory.take(dark, {1: NODES[0]}, se2.pose(90.0, 0.0, 0.0))
+        return memory.recall(dark, File(picture)).sum()
+
+    assert seen(picture) == 0 < seen(zlib.compress(b"\xff" * 288))

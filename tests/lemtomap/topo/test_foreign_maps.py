@@ -230,6 +230,7 @@ def test_every_connection_distrusts_the_file(path):
         with closing(connect(path)) as db:
             assert db.execute("PRAGMA trusted_schema").fetchone() == (0,)
             assert db.execute("PRAGMA cell_size_check").fetchone() == (1,)
+            assert db.getlimit(sqlite3.SQLITE_LIMIT_LENGTH) == schema.MOST_VALUE_BYTES
             with pytest.raises(sqlite3.OperationalError):
                 db.execute("SELECT load_extension('x')")
 
