@@ -1,5 +1,6 @@
 """Putting a robot together from its settings."""
 
+from functools import partial
 from pathlib import Path
 
 from lemtomap.errors import BadSetting
@@ -39,5 +40,6 @@ def build_core(
     recogniser = None if slam == "gmapping" else LoopRecogniser()  # a growing grid is too large to search
     topo = TopoMapper(config.topo, store, recogniser=recogniser)
     mapping = MappingStep(Mapper(lambda: build_slam(slam, config, seed), topo), exchange)
-    navigation = NavigationStep(Navigator(config.nav), exchange, lambda: TopoReader(map_path))
+    reader = partial(TopoReader, map_path, is_checked=True)
+    navigation = NavigationStep(Navigator(config.nav), exchange, reader)
     return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)

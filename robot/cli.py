@@ -14,11 +14,13 @@ import typer
 
 from drivers.errors import DriverError
 from lemtomap.errors import LemtomapError
+from lemtomap.topo.naming import shown
 from robot import cli_doctor, cli_drive, cli_file, cli_map
 from robot.cli_help import Interrupted
 from robot.interrupts import on_interrupt, raise_interrupt
 from sim.errors import SimError
 
+LINE = 2000  # characters that a person is told at once
 INTERRUPTED = 130  # as shells say it: 128 and SIGINT
 DEBUG_VARIABLE = "LEMTOMAP_DEBUG"  # set: show the traceback of an unexpected error
 
@@ -102,8 +104,8 @@ def _usage(error: typer.TyperException) -> int:
 
 
 def _fail(code: int, text: str) -> int:
-    """Write one line to stderr."""
-    line = " ".join(text.split())
+    """Write one line to stderr, nothing in it that a terminal would obey."""
+    line = shown(" ".join(text.split()), LINE)
     with contextlib.suppress(OSError):  # nobody reads any more
         sys.stderr.write(f"lemtomap: {line}\n")
     return code

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from robot.cli_help import add
+from robot.places import check_places, mission_from
 
 MISSIONS = (
     "explore, tour, goto:PLACE (a node's number, its name, far, start), level:N (on that floor now), dock, "
@@ -131,6 +132,8 @@ def sim(
 
         serve_world(world, seed, duration_s=math.inf, truth_path=None, gui=gui)
         return
+    if nav is Nav.TOPOLOGICAL:
+        check_places(mission_from(mission, map_file), map_file)
     from robot.parts import parse_size
     from robot.progress import progress_bar
     from robot.sim_run import SimOptions, run_sim
@@ -188,6 +191,7 @@ def run(
     seed: Annotated[int, typer.Option(metavar="N", help="of the particles")] = 0,
 ) -> None:
     """Run the real robot: map, explore, drive to places. Ctrl-C stops it and writes the results."""
+    check_places(mission, map_file)
     from robot.parts import parse_size
     from robot.robot_run import RobotOptions
 
@@ -210,10 +214,11 @@ def goto(
     config: Config = None,
 ) -> None:
     """Drive the real robot to a place of a map."""
-    from robot.robot_run import RobotOptions
-
     if not map_file.exists():
         raise typer.BadParameter(f"{map_file}: no such map file", param_hint="--map")
+    check_places(f"goto:{place}", map_file)
+    from robot.robot_run import RobotOptions
+
     _drive("goto", RobotOptions(f"goto:{place}", math.inf, kobuki, hokuyo, map_file, out, config))
 
 

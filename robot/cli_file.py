@@ -20,8 +20,9 @@ def register(app: typer.Typer) -> None:
         "lemtomap edit office.lemto block kitchen 14        plan no way along this edge",
         "lemtomap edit office.lemto open kitchen 14",
         "lemtomap edit office.lemto delete-edge 3 97        a closure that is wrong",
-        "lemtomap edit office.lemto level 31 1",
+        "lemtomap edit office.lemto level 31 -1",
         "lemtomap edit office.lemto undo",
+        takes_minus=True,
     )
     add(
         app,

@@ -13,6 +13,7 @@ from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal, NavOutput, NavState
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import LevelChanged, NavEvent
+from lemtomap.topo.naming import number
 from lemtomap.types import MapView, RouteGraph
 from robot.exchange import MissionState
 from robot.ways import farthest_node, ways_from
@@ -217,8 +218,9 @@ class Series:
 
 def resolve(place: str, moment: Moment) -> int | None:
     """Return the node meant by a number, a name, `here`, `start` or `far`; None when there is none."""
-    if re.fullmatch(r"\d+", place):
-        return int(place) if moment.graph.has_node(int(place)) else None
+    node_id = number(place)
+    if node_id is not None and moment.graph.has_node(node_id):
+        return node_id
     named = moment.graph.node_of(place)
     if named is not None:
         return named
@@ -244,7 +246,7 @@ def _parse_one(text: str) -> Mission:
     kind, _, place = text.partition(":")
     if kind == "goto" and place:
         return GoTo(place)
-    if kind == "level" and re.fullmatch(r"-?\d+", place):
+    if kind == "level" and re.fullmatch(r"-?[0-9]{1,3}", place):
         return ChangeLevel(int(place))
     if text == "explore":
         return Explore()

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.se2 import Pose
+from lemtomap.topo.naming import shown
+from lemtomap.topo.picture import plain_text, write_name
 from lemtomap.types import EdgeType, GridView
 from robot.outputs import grey_levels
 
@@ -22,6 +24,7 @@ EDGE_STYLE = {
     EdgeType.LOOP_CLOSING: ("#d62828", 2.2, "loop closing"),
 }
 NODE_COLOUR, PATH_COLOUR, ROBOT_COLOUR = "#1d3557", "#457b9d", "#d62828"
+TITLE = 100  # characters
 LONGEST_SIDE_CELLS = 2500  # of the wall picture; more is beyond the paper's resolution
 
 
@@ -69,6 +72,11 @@ class Overview:
 
 def draw(path: Path, overview: Overview) -> None:
     """Draw the picture, 1800 x 1200 pixels, whole or not at all."""
+    with plain_text():
+        _draw(path, overview)
+
+
+def _draw(path: Path, overview: Overview) -> None:
     figure = Figure(figsize=(15, 10), dpi=120, layout="constrained", facecolor="white")
     layout = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 0.8))
     whole = figure.add_subplot(layout[:, 0])
@@ -76,7 +84,7 @@ def draw(path: Path, overview: Overview) -> None:
     _draw_window(figure.add_subplot(layout[0, 1]), overview)
     _write_facts(figure.add_subplot(layout[1, 1]), overview)
     figure.legend(handles=_legend(overview), loc="outside lower left", ncols=6, fontsize=9)
-    figure.suptitle(overview.title, fontsize=15, fontweight="bold")
+    figure.suptitle(shown(overview.title, TITLE), fontsize=15, fontweight="bold")
     partial = path.with_name(f".{path.name}.part")
     figure.savefig(partial, format="png")
     partial.replace(path)
@@ -145,8 +153,7 @@ def _draw_graph(axes: Axes, overview: Overview) -> None:
         axes.scatter(nodes[:, 0], nodes[:, 1], s=size, color=NODE_COLOUR, zorder=7, linewidths=0)
     for node_id, name in overview.names.items():
         if node_id in overview.T_map_node:
-            x, y = overview.T_map_node[node_id][:2]
-            axes.annotate(name, (x, y), textcoords="offset points", xytext=(4, 4), fontsize=9, zorder=9)
+            write_name(axes, name, overview.T_map_node[node_id], xytext=(4, 4), fontsize=9, zorder=9)
 
 
 def _draw_robot(axes: Axes, T_map_base: Pose, size_m: float) -> None:
@@ -176,7 +183,8 @@ def _draw_window(axes: Axes, overview: Overview) -> None:
 def _write_facts(axes: Axes, overview: Overview) -> None:
     """Write the figures that matter beside the picture."""
     axes.axis("off")
-    axes.text(0.02, 0.98, "\n".join(overview.facts), va="top", family="monospace", fontsize=9.5)
+    facts = "\n".join(shown(fact) for fact in overview.facts)
+    axes.text(0.02, 0.98, facts, va="top", family="monospace", fontsize=9.5)
 
 
 def _corners(grid: GridView) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from drivers.port import BytePort, open_serial
 from lemtomap.errors import BadSetting
 from lemtomap.grid import DEFAULT_SLAM
 from lemtomap.topo.events import LevelChanged
-from lemtomap.topo.reader import TopoReader
+from lemtomap.topo.store import TopoStore
 from robot import ports
 from robot.config import PortsConfig, RobotConfig, load
 from robot.display import has_display
@@ -101,7 +101,7 @@ def _map_path(out: Path, wanted: Path | None) -> Path:
     """Return where the map is or will be; an existing one must be asked for by name."""
     if wanted is not None:
         if wanted.exists():
-            TopoReader(wanted).close()
+            TopoStore.view(wanted).close()
         return wanted
     path = out / "map.lemto"
     if path.exists():

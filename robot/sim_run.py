@@ -7,7 +7,7 @@ from typing import Any
 from drivers.port import open_serial
 from lemtomap.errors import BadSetting
 from lemtomap.grid import DEFAULT_SLAM
-from lemtomap.topo.reader import TopoReader
+from lemtomap.topo.store import TopoStore
 from robot.config import RobotConfig
 from robot.core import RobotCore
 from robot.depth import DepthFeed
@@ -15,6 +15,7 @@ from robot.display import has_display
 from robot.lockstep import run_lockstep
 from robot.missions import parse_mission
 from robot.parts import DEFAULT_LIMIT
+from robot.places import mission_from
 from robot.progress import Bar, first_use
 from robot.run import Run, RunPlan, Stopped, Teller
 from robot.runtime import Ports, Runtime
@@ -52,12 +53,9 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
     """Run until the mission is over or the time is up; return the summary. Raises BadWorld, BadSetting."""
     worlds.load(options.world)
     if options.map_path is not None and options.map_path.exists():
-        TopoReader(options.map_path).close()
+        TopoStore.view(options.map_path).close()
     parse_mission(options.mission)
-    if (
-        options.mission.startswith("goto:") and options.map_path is None
-    ):  # the map is empty: see the building first
-        options = replace(options, mission=f"explore,{options.mission}")
+    options = replace(options, mission=mission_from(options.mission, options.map_path))
     if options.depth and not options.fast:
         raise BadSetting("--depth: the simulated camera has no cable in real time; add --fast")
     plan = RunPlan(

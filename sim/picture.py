@@ -36,12 +36,13 @@ def save_picture(world: World, path: Path, track: NDArray[np.float64] | None = N
     raster = world.raster
     rows, cols = raster.free.shape
     scale = INCHES_LONG / max(rows, cols)
-    figure, axis = plt.subplots(
-        figsize=(max(cols * scale, 2.5), max(rows * scale, 1.5) + 0.4), layout="constrained"
-    )
-    draw(world, axis, track)
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    with mpl.rc_context({"text.parse_math": False}):  # a room's name is no formula
+        figure, axis = plt.subplots(
+            figsize=(max(cols * scale, 2.5), max(rows * scale, 1.5) + 0.4), layout="constrained"
+        )
+        draw(world, axis, track)
+        figure.savefig(path, dpi=100)
+        plt.close(figure)
 
 
 def draw(world: World, axis: Any, track: NDArray[np.float64] | None = None) -> None:

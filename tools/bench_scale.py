@@ -11,7 +11,6 @@ Leaves scale.md, scale.json and scale.png; a size that is done is not done again
 
 import argparse
 import json
-import sqlite3
 import sys
 import tempfile
 import time
@@ -25,6 +24,7 @@ from matplotlib.figure import Figure
 
 from lemtomap.nav.config import RouteConfig
 from lemtomap.nav.route.network import RouteNetwork
+from lemtomap.topo import schema
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.reader import TopoReader
@@ -77,7 +77,7 @@ def measure(km: float, driver: Driver, path: Path, first: bool) -> tuple[Driver,
 
 def _bytes(path: Path) -> int:
     """Return the size of the map once everything written has been folded into it, as on closing."""
-    with closing(sqlite3.connect(path)) as connection:
+    with closing(schema.connect(path)) as connection:
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     return path.stat().st_size
 

@@ -19,6 +19,8 @@ Covariance = NDArray[np.float64]
 """float64 (3, 3): m, m, rad, symmetric and positive definite."""
 
 USUAL_SPEED_MPS = 0.4  # expected speed on an edge nobody has driven yet; half of Kobuki's 0.7 m/s and a bit
+FOR_EVER_S = 1e18
+"""blocked_until_s of an edge closed by hand."""
 UNPROVEN_DETOUR = 8.0
 """Way over straight line on a loop closing edge that nobody has driven: it says where a place is, not that
 one can drive straight to it (thesis, section 2-1, observation based edges); a wall may stand between."""
@@ -77,6 +79,16 @@ class Edge:
         if self.time_s is not None:
             return self.time_s
         return self.length_m / USUAL_SPEED_MPS * detour(self.type)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether somebody closed it by hand; what a robot closed opens again by itself."""
+        return self.blocked_until_s >= FOR_EVER_S
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether the line between the ends is known to be free: driven, or seen in the window."""
+        return self.time_s is not None or self.type is not EdgeType.LOOP_CLOSING
 
     def other(self, node_id: int) -> int:
         """Return the end that is not `node_id`."""

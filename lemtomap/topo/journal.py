@@ -1,6 +1,7 @@
 """Undo: before an edit, the rows it touches are written down; undoing puts them back as they were.
 
-It works on rows and knows nothing of what an edit means, so every edit can be undone, in reverse order.
+It works on rows and knows nothing of what an edit means, so every edit can be undone, in reverse order. What
+a file's journal says is believed only as far as it names our tables and columns and leaves a sound map.
 """
 
 import base64
@@ -10,6 +11,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from lemtomap.errors import BadMap
+from lemtomap.topo.checks import COLUMNS
+from lemtomap.topo.naming import shown
 from lemtomap.topo.store import TopoStore
 
 KEYS = {
@@ -59,11 +63,13 @@ class Recording:
 
 @contextmanager
 def recorded(store: TopoStore, what: str, stamp_s: float = 0.0) -> Iterator[Recording]:
-    """Make everything written inside one edit that `undo` takes back."""
+    """Make everything written inside one edit that `undo` takes back; when the body raises, none of it."""
     recording = Recording(store)
-    yield recording
-    store.write("INSERT INTO journal(stamp, what, before) VALUES(?, ?, ?)", (stamp_s, what, recording.text()))
-    store.write("DELETE FROM journal WHERE id <= (SELECT max(id) FROM journal) - ?", (KEPT_EDITS,))
+    with store.whole():
+        yield recording
+        sql = "INSERT INTO journal(stamp, what, before) VALUES(?, ?, ?)"
+        store.write(sql, (stamp_s, what, recording.text()))
+        store.write("DELETE FROM journal WHERE id <= (SELECT max(id) FROM journal) - ?", (KEPT_EDITS,))
 
 
 def entries(store: TopoStore) -> list[Entry]:
@@ -72,21 +78,45 @@ def entries(store: TopoStore) -> list[Entry]:
 
 
 def undo(store: TopoStore) -> str | None:
-    """Take back the newest edit; returns what it was, None when there is nothing to undo."""
+    """Take back the newest edit; returns what it was, None when there is nothing to undo.
+
+    Raises BadMap for a journal that is not ours; then nothing has changed.
+    """
     newest = list(store.query("SELECT id, what, before FROM journal ORDER BY id DESC LIMIT 1"))
     if not newest:
         return None
     entry_id, what, before = newest[0]
-    for table, key, row in json.loads(before):
-        store.write(f"DELETE FROM {table} WHERE {KEYS[table]} = ?", (key,))  # noqa: S608
-        if row is not None:
-            columns = ", ".join(row)
-            marks = ", ".join("?" * len(row))
-            values = [_plain(value) for value in row.values()]
-            store.write(f"INSERT INTO {table}({columns}) VALUES({marks})", values)
-    store.write("DELETE FROM journal WHERE id = ?", (entry_id,))
+    with store.whole():
+        try:
+            for table, key, row in _rows_of(before):
+                store.write(f"DELETE FROM {table} WHERE {KEYS[table]} = ?", (key,))  # noqa: S608
+                if row is not None:
+                    columns, marks = ", ".join(row), ", ".join("?" * len(row))
+                    store.write(f"INSERT INTO {table}({columns}) VALUES({marks})", row.values())
+            store.write("DELETE FROM journal WHERE id = ?", (entry_id,))
+            store.check_rows()
+        except (BadMap, ValueError, TypeError, RecursionError, OverflowError):
+            told = "cannot be taken back: what it changed is gone, or the journal is damaged"
+            raise BadMap(f"{store.path}: '{shown(what)}' {told}") from None
     store.changed_everywhere()
     return str(what)
+
+
+def _rows_of(before: str) -> list[tuple[str, float | str, dict[str, Any] | None]]:
+    """Return what a journal entry wrote down: table, key and the row, None where there was none.
+
+    Raises ValueError or TypeError for what no edit wrote.
+    """
+    rows: list[tuple[str, float | str, dict[str, Any] | None]] = []
+    written = json.loads(before)
+    if not isinstance(written, list):
+        raise TypeError(before)
+    for table, key, row in written:
+        if table not in KEYS or not (row is None or set(row) == set(COLUMNS[table])):
+            raise ValueError(table)
+        plain = None if row is None else {name: _plain(value) for name, value in row.items()}
+        rows.append((table, key, plain))
+    return rows
 
 
 def _row(store: TopoStore, table: str, key: float | str) -> dict[str, Any] | None:
@@ -102,4 +132,6 @@ def _coded(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    return base64.b64decode(value["bytes"]) if isinstance(value, dict) else value
+    if isinstance(value, dict):
+        return base64.b64decode(str(value.get("bytes")))
+    return value

@@ -7,7 +7,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from lemtomap.topo import schema
+from lemtomap.errors import BadMap
+from lemtomap.topo import checks, schema
 from lemtomap.topo.graph import USUAL_SPEED_MPS, Mark, Placeholder, detour
 from lemtomap.topo.rows import MEASURE, placeholder_from, planar_length_m, type_code
 from lemtomap.types import EdgeTable, EdgeType, RouteEdge
@@ -29,10 +30,19 @@ CACHED_NODES = 16_384  # some 500 bytes each, 8 MB: more than a map has that is 
 class TopoReader:
     """A RouteGraph over a map file that another connection may be writing."""
 
-    def __init__(self, path: Path | str, *, cached_nodes: int = CACHED_NODES) -> None:
+    def __init__(
+        self, path: Path | str, *, cached_nodes: int = CACHED_NODES, is_checked: bool = False
+    ) -> None:
+        """Open a map. `is_checked`: a TopoStore of this program holds it, and has checked all of it."""
         self.path = Path(path)
         schema.check_file(self.path)
         self._db = schema.connect_readonly(self.path)
+        if not is_checked:
+            try:
+                checks.check_content(self.path, self._db)
+            except BadMap:
+                self._db.close()
+                raise
         self._cached_nodes = cached_nodes
         self._edges: OrderedDict[int, Sequence[RouteEdge]] = OrderedDict()
         self._seen_data_version = -1

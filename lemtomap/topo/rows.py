@@ -15,12 +15,14 @@ EDGE_COLUMNS = "id, source, target, type, share, time, blocked, measure"
 
 MEASURE = struct.Struct("<3d3e3h")
 """Relative pose in full; of the covariance standard deviations to a thousandth, and correlations."""
-_CORRELATION_STEPS = 32767
+CORRELATION_STEPS = 32767
 _SHRINK = 1.0 - 2e-4  # of correlations: rounded, the covariance must stay positive definite
 _LEAST_SIGMA, _MOST_SIGMA = 1e-4, 6e4  # of half precision
-_TYPES = (EdgeType.ODOMETRY, EdgeType.NEAR_NEIGHBOUR, EdgeType.LOOP_CLOSING)
-_CODES = {kind: code for code, kind in enumerate(_TYPES)}
-_SHARE_STEPS = 255
+TYPES = (EdgeType.ODOMETRY, EdgeType.NEAR_NEIGHBOUR, EdgeType.LOOP_CLOSING)
+_CODES = {kind: code for code, kind in enumerate(TYPES)}
+SHARE_STEPS = 255
+PLACE_FORMAT, MOST_PLACE_CELLS = 2, 120
+"""First two bytes of coded localisation data: the format, and at most so many cells to each side."""
 
 
 def node_row(node: Node) -> tuple[Any, ...]:
@@ -41,7 +43,7 @@ def edge_row(edge: Edge) -> tuple[Any, ...]:
         edge.source_id,
         edge.target_id,
         _CODES[edge.type],
-        round(edge.share * _SHARE_STEPS),
+        round(edge.share * SHARE_STEPS),
         edge.time_s,
         edge.blocked_until_s or None,
         measure,
@@ -58,8 +60,8 @@ def edge_from(row: Sequence[Any]) -> Edge:
         target,
         np.array(values[:3]),
         _covariance(values[3:6], values[6:]),
-        _TYPES[code],
-        share / _SHARE_STEPS,
+        TYPES[code],
+        share / SHARE_STEPS,
         time_s,
         blocked_s or 0.0,
     )
@@ -86,13 +88,13 @@ def _spread(covariance: Covariance) -> tuple[float, ...]:
     """Return three standard deviations and three correlations in steps."""
     xx, yy, tt = (math.sqrt(covariance[k, k]) for k in range(3))
     pairs = ((0, 1, xx * yy), (0, 2, xx * tt), (1, 2, yy * tt))
-    steps = [round(_SHRINK * float(covariance[i, j]) / scale * _CORRELATION_STEPS) for i, j, scale in pairs]
+    steps = [round(_SHRINK * float(covariance[i, j]) / scale * CORRELATION_STEPS) for i, j, scale in pairs]
     return (*(min(max(sigma, _LEAST_SIGMA), _MOST_SIGMA) for sigma in (xx, yy, tt)), *steps)
 
 
 def _covariance(sigmas: Sequence[float], steps: Sequence[int]) -> Covariance:
     x, y, t = sigmas
-    xy, xt, yt = (step / _CORRELATION_STEPS for step in steps)
+    xy, xt, yt = (step / CORRELATION_STEPS for step in steps)
     return np.array(
         [[x * x, xy * x * y, xt * x * t], [xy * x * y, y * y, yt * y * t], [xt * x * t, yt * y * t, t * t]]
     )

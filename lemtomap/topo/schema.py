@@ -8,17 +8,19 @@ read only the file's header, so a file that is not ours is never touched.
 import contextlib
 import os
 import sqlite3
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
 from lemtomap.errors import BadMap
+from lemtomap.topo.naming import shown
 
 APPLICATION_ID = 0x4C454D54  # "LEMT"
 SCHEMA_VERSION = 2
 PAGE_SIZE = 1024  # a small map stays small: every table and index takes at least one page
-QUICK_CHECK_LIMIT_BYTES = 32 << 20  # below this the whole tree is checked on opening (some 1 ms a megabyte)
+MOST_VALUE_BYTES = 16 << 20  # of one text or blob: the journal's largest are a hundredth of it
 LEAST_BYTES = 512  # of an SQLite file: its smallest page
 _MAGIC = b"SQLite format 3\0"
 
@@ -42,6 +44,23 @@ INDEXES = {
     "edge_target": "edge(target)",
     "edge_blocked": "edge(id) WHERE blocked IS NOT NULL",
 }
+DESCRIPTOR_BYTES = 20
+LOOK_UP_TABLES = {
+    "place_leaf": "(id INTEGER PRIMARY KEY, entries BLOB)",
+    "place_split": "(id INTEGER PRIMARY KEY, axis INT, cut INT, low INT, high INT)",
+    "place_fresh": "(id INTEGER PRIMARY KEY, node INT, was BLOB, now BLOB)",
+}
+"""Of `lemtomap.topo.loops.index`, which makes and fills them."""
+TRIGGERS = {
+    # before, because a REPLACE deletes the old row without telling
+    "place_written": "BEFORE INSERT ON place BEGIN INSERT INTO place_fresh(node, was, now) "
+    "VALUES(NEW.node, (SELECT descriptor FROM place WHERE node = NEW.node), NEW.descriptor); END",
+    "place_changed": "AFTER UPDATE OF descriptor ON place BEGIN "
+    "INSERT INTO place_fresh(node, was, now) VALUES(NEW.node, OLD.descriptor, NEW.descriptor); END",
+    "place_gone": "AFTER DELETE ON place BEGIN "
+    "INSERT INTO place_fresh(node, was, now) VALUES(OLD.node, OLD.descriptor, NULL); END",
+}
+"""They queue every change of localisation data for the look-up."""
 
 
 def complete(connection: sqlite3.Connection) -> None:
@@ -53,7 +72,7 @@ def complete(connection: sqlite3.Connection) -> None:
 
 
 def strip(connection: sqlite3.Connection) -> None:
-    """Leave out indexes, triggers, empty tables and those of others (look-ups, which they make again)."""
+    """Leave out what follows from the rows (indexes, triggers, look-ups) and empty tables."""
     connection.execute("BEGIN")
     connection.execute("DELETE FROM change")
     rows = connection.execute("SELECT type, name FROM sqlite_schema WHERE type != 'table'").fetchall()
@@ -70,11 +89,11 @@ def guarded(path: Path) -> Iterator[None]:
     """Turn what SQLite says into one line about this map file."""
     try:
         yield
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:  # of a damaged schema that SQLite quotes
         raise BadMap(f"{path}: {_reason(error)}") from error
 
 
-def _reason(error: sqlite3.Error) -> str:
+def _reason(error: Exception) -> str:
     text = str(error)
     if "full" in text:
         return "the disk is full; the map is safe up to the last second"
@@ -82,11 +101,11 @@ def _reason(error: sqlite3.Error) -> str:
         return "the disk refuses to be written or read (is it full?); what was saved before is safe"
     if "readonly" in text or "unable to open" in text:
         return "cannot be written here (read-only file or folder)"
-    if "malformed" in text or "not a database" in text:
+    if any(word in text for word in ("malformed", "not a database", "decode", "too big")):
         return "damaged or truncated map file"
     if "locked" in text:
         return "another program is writing to this map"
-    return text
+    return shown(text)
 
 
 def check_file(path: Path) -> None:
@@ -106,7 +125,7 @@ def check_file(path: Path) -> None:
         try:
             ((application_id,),) = connection.execute("PRAGMA application_id")
             ((version,),) = connection.execute("PRAGMA user_version")
-        except sqlite3.DatabaseError:
+        except (sqlite3.DatabaseError, UnicodeDecodeError):
             raise BadMap(f"{path}: not a .lemto map file") from None
     if application_id != APPLICATION_ID:
         raise BadMap(f"{path}: an SQLite file, but not a .lemto map")
@@ -126,23 +145,6 @@ def _refuse_stump(path: Path) -> None:
     if data[:16] != _MAGIC[: len(data)]:
         raise BadMap(f"{path}: not a .lemto map file")
     raise BadMap(f"{path}: truncated after {len(data)} bytes")
-
-
-def check_content(path: Path, connection: sqlite3.Connection) -> None:
-    """Raise BadMap when the file is shorter than its own page count, or (small files) its tree is broken."""
-    with guarded(path):
-        (pages,) = connection.execute("PRAGMA page_count").fetchone()
-        (page_size,) = connection.execute("PRAGMA page_size").fetchone()
-        wal = path.with_name(path.name + "-wal")
-        settled = not wal.exists() or wal.stat().st_size == 0
-        size = path.stat().st_size
-        if settled and size < pages * page_size:
-            raise BadMap(f"{path}: truncated, {size} of {pages * page_size} bytes are there")
-        if size <= QUICK_CHECK_LIMIT_BYTES:
-            (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-            if verdict != "ok":
-                raise BadMap(f"{path}: damaged map file ({str(verdict).splitlines()[-1]})")
-        connection.execute("SELECT count(*) FROM node").fetchone()
 
 
 def connect(path: Path) -> sqlite3.Connection:
@@ -192,8 +194,18 @@ def _connect(path: Path, how: str) -> sqlite3.Connection:
         uri, uri=True, isolation_level=None, check_same_thread=False, timeout=5.0, cached_statements=64
     )
     try:
+        _distrust(connection)
         connection.execute("PRAGMA cache_size = -2048")  # looks at the file for the first time
-    except sqlite3.Error:
+    except (sqlite3.Error, UnicodeDecodeError):
         connection.close()
         raise
     return connection
+
+
+def _distrust(connection: sqlite3.Connection) -> None:
+    """Let nothing that a file holds be run or grow without bounds: it may come from anywhere."""
+    connection.execute("PRAGMA trusted_schema = OFF")
+    connection.execute("PRAGMA cell_size_check = ON")
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_VALUE_BYTES)
+    if sys.version_info >= (3, 12):
+        connection.setconfig(sqlite3.SQLITE_DBCONFIG_DEFENSIVE, True)

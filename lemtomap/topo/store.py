@@ -10,13 +10,14 @@ import contextlib
 import os
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
 from lemtomap.errors import BadMap
-from lemtomap.topo import schema
-from lemtomap.topo.graph import Edge, Mark, Node, OpeningState, Place, Placeholder
+from lemtomap.topo import checks, schema
+from lemtomap.topo.graph import FOR_EVER_S, Edge, Mark, Node, OpeningState, Place, Placeholder
 from lemtomap.topo.rows import (
     EDGE_COLUMNS,
     NODE_COLUMNS,
@@ -29,8 +30,6 @@ from lemtomap.topo.rows import (
 
 COMPACT_BELOW_BYTES = 8 << 20  # rewriting a map of this size on closing takes some 50 ms
 STRIP_BELOW_BYTES = 1 << 20  # below this all look-ups are made again within seconds of opening
-FOR_EVER_S = 1e18
-"""blocked_until_s of an edge closed by hand."""
 KEPT_CHANGES = 8192  # a reader further behind than this reads afresh
 
 
@@ -84,14 +83,14 @@ class TopoStore:
 
     @classmethod
     def open(cls, path: Path | str, *, durable: bool = True, commit_every_s: float = 0.5) -> Self:
-        """Open a map to go on with it. Raises BadMap for anything that is not a whole map of our schema, and
-        for one that another program has open.
+        """Open a map to go on with it. Raises BadMap for anything that is not a whole map of our schema, for
+        one whose rows cannot be (`checks`), and for one that another program has open.
         """
         path = Path(path)
         schema.check_file(path)
         connection = schema.connect(path)
         try:
-            schema.check_content(path, connection)
+            checks.check_content(path, connection)
             with schema.guarded(path):
                 schema.claim(path, connection)
             return cls._prepared(path, connection, durable=durable, commit_every_s=commit_every_s)
@@ -106,11 +105,34 @@ class TopoStore:
         schema.check_file(path)
         connection = schema.connect_readonly(path)
         try:
-            schema.check_content(path, connection)
+            checks.check_content(path, connection)
             return cls(path, connection, readonly=True)
         except BadMap:
             connection.close()
             raise
+
+    @classmethod
+    @contextmanager
+    def editing(cls, path: Path | str) -> Iterator[Self]:
+        """Open a map for one change, kept when the body ends well; else the file stays as it was.
+
+        Raises BadMap as `open` does.
+        """
+        path = Path(path)
+        schema.check_file(path)
+        connection = schema.connect(path)
+        try:
+            checks.check_content(path, connection)
+            with schema.guarded(path):
+                schema.claim(path, connection)
+                connection.execute("BEGIN IMMEDIATE")
+                schema.complete(connection)
+                store = cls(path, connection)
+            yield store
+        except BaseException:
+            connection.close()  # which rolls back
+            raise
+        store.close()
 
     @classmethod
     def _prepared(
@@ -216,16 +238,41 @@ class TopoStore:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    @contextmanager
+    def whole(self) -> Iterator[None]:
+        """Keep what the body writes as a whole: when it raises, nothing of it."""
+        self._begin()
+        with schema.guarded(self.path):
+            self._db.execute("SAVEPOINT whole")
+        try:
+            yield
+        except BaseException:
+            with schema.guarded(self.path):
+                self._db.execute("ROLLBACK TO whole")
+                self._db.execute("RELEASE whole")
+            raise
+        with schema.guarded(self.path):
+            self._db.execute("RELEASE whole")
+
+    def check_rows(self) -> None:
+        """Raise BadMap when some row, uncommitted writes included, holds what no map of ours does."""
+        with schema.guarded(self.path):
+            checks.check_rows(self.path, self._db)
+
     def write(self, sql: str, values: Iterable[Any] = ()) -> None:
         """Run one statement inside the open transaction (edits and undo)."""
         self._write(sql, tuple(values))
 
     def _write(self, sql: str, values: tuple[Any, ...]) -> None:
+        self._begin()
         with schema.guarded(self.path):
-            if not self._db.in_transaction:
-                self._db.execute("BEGIN IMMEDIATE")
-                self._begun_s = self._stamp_s or 0.0
             self._db.execute(sql, values)
+
+    def _begin(self) -> None:
+        if not self._db.in_transaction:
+            with schema.guarded(self.path):
+                self._db.execute("BEGIN IMMEDIATE")
+            self._begun_s = self._stamp_s or 0.0
 
     def query(self, sql: str, values: Iterable[Any] = ()) -> Iterator[tuple[Any, ...]]:
         """Iterate over the rows of a read, uncommitted writes included."""

@@ -8,6 +8,7 @@ from scipy import ndimage
 
 from sim import worlds
 from sim.errors import BadWorld
+from sim.picture import save_picture
 from sim.raster import clearance_m
 
 HOME = """
@@ -188,3 +189,10 @@ def test_described_things_can_stand_in_a_ros_map(tmp_path):
     (tmp_path / "w.toml").write_text('name = "w"\nmap = "gone.yaml"\n')
     with pytest.raises(BadWorld, match=r"gone\.yaml: no such file"):
         worlds.load(tmp_path / "w.toml")
+
+
+def test_a_picture_takes_no_name_for_a_formula(tmp_path):
+    path = tmp_path / "odd.toml"
+    path.write_text(HOME.replace('"kitchen"', r"'lab $\foo$'").replace('"home"', r"'home $\bar$'"))
+    save_picture(worlds.load(str(path)), tmp_path / "odd.png")
+    assert (tmp_path / "odd.png").read_bytes().startswith(b"\x89PNG")

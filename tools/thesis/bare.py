@@ -1,10 +1,11 @@
 """What a map takes on disk without its localisation data: V0.5 kept none (table 5-1)."""
 
 import shutil
-import sqlite3
 import tempfile
 from contextlib import closing
 from pathlib import Path
+
+from lemtomap.topo import schema
 
 
 def bare_bytes(path: Path) -> int:
@@ -12,7 +13,7 @@ def bare_bytes(path: Path) -> int:
     with tempfile.TemporaryDirectory() as folder:
         bare = Path(folder) / "bare.lemto"
         shutil.copyfile(path, bare)
-        with closing(sqlite3.connect(bare, isolation_level=None)) as connection:
+        with closing(schema.connect(bare)) as connection:
             connection.execute("DELETE FROM place")
             connection.execute("VACUUM")
         return bare.stat().st_size

@@ -124,7 +124,7 @@ class SeenMemory:
             self._pictures.move_to_end(node_id)
             return self._pictures[node_id]
         told = graph.ground_seen(node_id) if isinstance(graph, RemembersGround) else None
-        picture = None if told is None else np.frombuffer(zlib.decompress(told), dtype=np.uint8)
+        picture = None if told is None else _decoded(told)
         self._pictures[node_id] = picture
         if len(self._pictures) > self._kept:
             oldest_id = next(iter(self._pictures))
@@ -132,6 +132,16 @@ class SeenMemory:
                 self._tell(oldest_id)
             del self._pictures[oldest_id]
         return picture
+
+
+def _decoded(told: bytes) -> Picture | None:
+    """Return the picture that a map holds, None when it is none: then nothing is known of that ground."""
+    size = SIDE * SIDE // 8
+    try:
+        data = zlib.decompressobj().decompress(told, size + 1)
+    except zlib.error:
+        return None
+    return np.frombuffer(data, dtype=np.uint8) if len(data) == size else None
 
 
 def _sure(bits: NDArray[np.uint8], cells: int) -> NDArray[np.uint8]:

@@ -18,22 +18,13 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.topo import schema
 from lemtomap.topo.loops.descriptor import BYTES, unpack
 
 LEAF_ENTRIES = 96
-TABLES = (
-    "CREATE TABLE IF NOT EXISTS place_leaf(id INTEGER PRIMARY KEY, entries BLOB)",
-    "CREATE TABLE IF NOT EXISTS place_split(id INTEGER PRIMARY KEY, axis INT, cut INT, low INT, high INT)",
-)
 QUEUE = (
-    "CREATE TABLE place_fresh(id INTEGER PRIMARY KEY, node INT, was BLOB, now BLOB)",
-    # before, because a REPLACE deletes the old row without telling
-    """CREATE TRIGGER place_written BEFORE INSERT ON place BEGIN INSERT INTO place_fresh(node, was, now)
-    VALUES(NEW.node, (SELECT descriptor FROM place WHERE node = NEW.node), NEW.descriptor); END""",
-    """CREATE TRIGGER place_changed AFTER UPDATE OF descriptor ON place BEGIN
-    INSERT INTO place_fresh(node, was, now) VALUES(NEW.node, OLD.descriptor, NEW.descriptor); END""",
-    """CREATE TRIGGER place_gone AFTER DELETE ON place BEGIN
-    INSERT INTO place_fresh(node, was, now) VALUES(OLD.node, OLD.descriptor, NULL); END""",
+    f"CREATE TABLE place_fresh{schema.LOOK_UP_TABLES['place_fresh']}",
+    *(f"CREATE TRIGGER {name} {what}" for name, what in schema.TRIGGERS.items()),
     "INSERT INTO place_fresh(node, was, now) SELECT node, NULL, descriptor FROM place",
 )
 AT_ONCE = 64  # changes taken into the tree at one call: 3 ms
@@ -68,8 +59,8 @@ class PlaceIndex:
 
     def __init__(self, table: Table) -> None:
         self._table = table
-        for statement in TABLES:
-            table.write(statement)
+        for name in ("place_leaf", "place_split"):
+            table.write(f"CREATE TABLE IF NOT EXISTS {name}{schema.LOOK_UP_TABLES[name]}")
         self._axis, self._cut = array("b"), array("B")
         self._low, self._high = array("i"), array("i")
         self._grow(1)

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from lemtomap.errors import BadMap
 from lemtomap.topo.place import kernels
+from lemtomap.topo.rows import MOST_PLACE_CELLS, PLACE_FORMAT
 
-FORMAT = 2
 CELL_M = 0.1
 OFFSET_STEP_M = 0.025
 NORMAL_REACH_CELLS = 2
 SURE_SIDE = 0.2  # cosine of the mean look at a cell: glancing or from both sides, its front is not known
 HEADER_BYTES = 2
-MAX_RADIUS_M = 12.0
+MAX_RADIUS_M = MOST_PLACE_CELLS * CELL_M
 DECODED_KEPT = 256  # boundaries, some 6 kB each: around the robot the same ones are asked for again
 SHRINK = 0.95  # each try at the byte budget keeps at most this much of the radius
 
@@ -55,7 +55,7 @@ def encode_place(
     points[:, : points_node.shape[1]] = points_node
     while True:
         cells = max(1, round(min(radius_m, MAX_RADIUS_M) / CELL_M))
-        code = bytes([FORMAT, cells]) + _encode(points, cells)
+        code = bytes([PLACE_FORMAT, cells]) + _encode(points, cells)
         if byte_budget is None or len(code) <= byte_budget or cells == 1:
             return code
         radius_m = min(SHRINK, (byte_budget / len(code)) ** 0.7) * cells * CELL_M
@@ -64,7 +64,7 @@ def encode_place(
 @lru_cache(DECODED_KEPT)
 def decode_place(blob: bytes) -> Boundary:
     """Return the boundary of a code, to be read only. Raises BadMap for a code of another format."""
-    if len(blob) < HEADER_BYTES or blob[0] != FORMAT or blob[1] == 0:
+    if len(blob) < HEADER_BYTES or blob[0] != PLACE_FORMAT or blob[1] == 0:
         raise BadMap("localisation data of an unknown format")
     cells = blob[1]
     bitmap, levels, sides = _canvas(cells), _canvas(cells).astype(np.int8), _canvas(cells).astype(np.int8)

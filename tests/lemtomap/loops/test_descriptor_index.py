@@ -90,17 +90,17 @@ def test_the_index_follows_what_anybody_writes_into_the_map(tmp_path):
     codes = [describe(place(seed)) for seed in range(4)]
     with TopoStore.create(tmp_path / "map.lemto") as store:
         node_ids = [store.add_node().node_id for _ in codes]
-        store.put_place(node_ids[0], Place(0.0, b"", codes[0]))
+        store.put_place(node_ids[0], Place(0.0, b"\x02\x01", codes[0]))
         index = PlaceIndex.of_map(store)
         for node_id, code in zip(node_ids[1:], codes[1:], strict=True):
-            store.put_place(node_id, Place(0.0, b"", code))
+            store.put_place(node_id, Place(0.0, b"\x02\x01", code))
         assert index.catch_up()
         assert [index.nearest(code, 1)[0].node_id for code in codes] == node_ids
         with recorded(store, "delete") as edit:
             edit.touch("place", node_ids[2])
             edit.touch("node", node_ids[2])
             store.delete_node(node_ids[2])
-        store.put_place(node_ids[1], Place(1.0, b"", codes[2]))
+        store.put_place(node_ids[1], Place(1.0, b"\x02\x01", codes[2]))
         index.catch_up()
         alike = index.nearest(codes[2], 9)
         assert (alike[0].node_id, alike[0].distance) == (node_ids[1], 0.0)

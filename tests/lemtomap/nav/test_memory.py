@@ -1,5 +1,6 @@
 """What exploration remembers of ground that the window forgot."""
 
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -104,3 +105,29 @@ def test_ground_counts_as_seen_only_where_its_middle_and_all_four_sides_are_know
     state[row, col] = kernels.FREE
     remember(state, 20.0, 20.0, 0.0, 4.0, seen)
     assert seen[0, 0] == 1
+
+
+class File:
+    """A map that holds one picture, whatever is asked for."""
+
+    def __init__(self, picture):
+        self._picture = picture
+
+    def ground_seen(self, node_id):  # noqa: ARG002
+        return self._picture
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [b"", b"picture", zlib.compress(bytes(287)), zlib.compress(b"\xff" * 289), zlib.compress(bytes(10**8))],
+    ids=["empty", "foreign", "short", "long", "bomb"],
+)
+def test_a_picture_that_is_none_tells_nothing_of_the_ground(picture):
+    dark = window(kernels.UNKNOWN)
+
+    def seen(picture):
+        memory = SeenMemory()
+        memory.take(dark, {1: NODES[0]}, se2.pose(90.0, 0.0, 0.0))
+        return memory.recall(dark, File(picture)).sum()
+
+    assert seen(picture) == 0 < seen(zlib.compress(b"\xff" * 288))

@@ -1,13 +1,15 @@
 import json
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
+import networkx as nx
 import numpy as np
 import pytest
 import yaml
 
 from lemtomap.errors import BadInput
 from lemtomap.se2 import between, wrap_angle
-from lemtomap.topo import edit, export
+from lemtomap.topo import edit, export, naming, picture
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.graph import Edge, Place
 from lemtomap.topo.info import describe_map
@@ -30,7 +32,7 @@ def store(tmp_path):
     mapper.close()
     with TopoStore.open(tmp_path / "office.lemto") as store:
         store.set_name("kitchen", 3)
-        store.put_place(3, Place(1.0, b"boundary", b"\x00\xff"))
+        store.put_place(3, Place(1.0, b"\x02\x32boundary", b"\x00\xff"))
         store.put_ground(3, b"picture")
         yield store
 
@@ -172,6 +174,133 @@ def test_g2o_reads_back_as_the_same_graph(store, tmp_path):
     assert np.abs(turns).max() < 1e-6
 
 
+def test_gtsam_reads_the_pose_graph_whole(store, tmp_path):
+    gtsam = pytest.importorskip("gtsam")
+    edit.block_edge(store, 2)
+    assert any(edge.share == 0.0 for edge in store.edges())
+    export.write_g2o(store, tmp_path / "map.g2o")
+    graph, values = gtsam.readG2o(str(tmp_path / "map.g2o"), False)
+    assert graph.size() == store.count("edge") - 1
+    assert values.size() == store.count("node")
+    assert graph.error(values) < 1e-3
+
+
+@pytest.fixture
+def walled(store):
+    """The ways that must not be driven: 1-2 is closed by hand; nobody has driven the closure 1-9."""
+    between_them = next(e for e in store.edges_of(1) if e.other(1) == 2)
+    edit.block_edge(store, between_them.edge_id)
+    closure = replace(between_them, source_id=1, target_id=9, type=EdgeType.LOOP_CLOSING, time_s=None)
+    assert store.add_edge(replace(closure, T_source_target=_apart(store, 1, 9))).edge_id
+    driven = replace(closure, source_id=2, target_id=9, time_s=3.0)
+    store.add_edge(replace(driven, T_source_target=_apart(store, 2, 9)))
+    return store
+
+
+def _apart(store, a, b):
+    at = lay_out(store).T_map_node
+    return between(at[a], at[b])
+
+
+FORBIDDEN, DRIVEN = [{1, 2}, {1, 9}], {2, 9}
+
+
+def test_no_way_goes_along_what_is_closed_or_what_nobody_has_driven(walled, tmp_path):
+    export.write_geojson(walled, tmp_path / "map.geojson")
+    features = json.loads((tmp_path / "map.geojson").read_text())["features"]
+    ends = [f["properties"] for f in features if "startid" in f["properties"]]
+    ways = [{end["startid"], end["endid"]} for end in ends]
+    assert not any(way in ways for way in FORBIDDEN)
+    assert ways.count(DRIVEN) == 2
+    export.write_tmap2(walled, tmp_path / "map.tmap2")
+    nodes = yaml.safe_load((tmp_path / "map.tmap2").read_text())["nodes"]
+    ways = [{node["node"]["name"], edge["node"]} for node in nodes for edge in node["node"]["edges"]]
+    assert not any({f"Node{a}", f"Node{b}"} in ways for a, b in FORBIDDEN)
+    assert {"Node2", "Node9"} in ways
+    assert export.left_out(walled) == (1, 1)
+
+
+def test_other_formats_mark_or_leave_out_what_is_closed(walled, tmp_path):
+    export.write_graphml(walled, tmp_path / "map.graphml")
+    graph = nx.read_graphml(tmp_path / "map.graphml")
+    marks = {frozenset((int(a), int(b))): (w["closed"], w["proven"]) for a, b, w in graph.edges(data=True)}
+    assert marks[frozenset((1, 2))][0] is True
+    assert marks[frozenset((1, 9))] == (False, False)
+    assert marks[frozenset(DRIVEN)] == (False, True)
+    export.write_g2o(walled, tmp_path / "map.g2o")
+    rows = [line.split() for line in (tmp_path / "map.g2o").read_text().splitlines()]
+    measured = [{int(row[1]), int(row[2])} for row in rows if row[0] == "EDGE_SE2"]
+    assert {1, 2} not in measured
+    assert {1, 9} in measured  # a closure is a measurement, whoever drives there
+    figure = picture._drawn(walled)
+    legend = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert "closed by hand (1)" in legend
+    assert "loop closing, not driven yet (1)" in legend
+
+
+def test_a_map_all_of_whose_ways_are_closed_is_refused_where_only_ways_count(tmp_path):
+    with TopoStore.create(tmp_path / "map.lemto") as store:
+        for _ in range(2):
+            store.add_node()
+        edge = Edge(0, 1, 2, np.array([2.0, 0, 0]), np.eye(3) * 1e-3, EdgeType.LOOP_CLOSING)
+        store.add_edge(edge)
+        for suffix in (".geojson", ".tmap2"):
+            with pytest.raises(BadInput, match="without an open way"):
+                export.WRITERS[suffix](store, tmp_path / f"map{suffix}")
+
+
+def test_closing_a_way_closes_every_edge_of_it_and_undo_opens_them(store):
+    first = next(e for e in store.edges_of(1) if e.other(1) == 2)
+    store.add_edge(replace(first, type=EdgeType.LOOP_CLOSING))
+    edit.block_between(store, 2, 1)
+    both = [e.edge_id for e in store.edges_of(1) if e.other(1) == 2]
+    assert [store.edge(edge_id).is_closed for edge_id in both] == [True, True]
+    edit.undo(store)
+    assert [store.edge(edge_id).is_closed for edge_id in both] == [False, False]
+
+
+ODD_NAMES = {
+    r"lab $\foo$": r"lab $\foo$",
+    "a\x00b\x1b[31m\ufffe": r"a\x00b\x1b[31m\ufffe",
+    "\u53a8\u623f \U0001f373": "\u53a8\u623f \U0001f373",
+    "<&\"'>]]>": "<&\"'>]]>",
+    "Node7": "Node7",
+    "long" * 1300: "long" * 19 + "lon\u2026",
+    "\ud7ff, {}: #": "\ud7ff, {}: #",
+}
+
+
+@pytest.mark.parametrize("name", ODD_NAMES, ids=range(len(ODD_NAMES)))
+def test_whatever_name_an_old_map_holds_every_export_of_it_can_be_read(store, tmp_path, name):
+    store.set_name(name, 4)
+    told = ODD_NAMES[name] if ODD_NAMES[name].isprintable() else naming.shown(name)
+    for suffix, write in export.WRITERS.items():
+        write(store, tmp_path / f"$x_{{map{suffix}")
+    features = json.loads((tmp_path / "$x_{map.geojson").read_text())["features"]
+    assert told in [f["properties"]["metadata"].get("name") for f in features]
+    nodes = yaml.safe_load((tmp_path / "$x_{map.tmap2").read_text())["nodes"]
+    names = [node["node"]["name"] for node in nodes]
+    assert told in names
+    assert len(set(names)) == len(names)
+    assert told in nx.get_node_attributes(nx.read_graphml(tmp_path / "$x_{map.graphml"), "name").values()
+    write_png(store, tmp_path / "$x_{map.png")
+    assert (tmp_path / "$x_{map.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_tmap2_edges_of_alike_names_and_of_two_edges_between_two_nodes_differ(store, tmp_path):
+    for node_id, name in ((1, "a"), (2, "b_c"), (4, "a_b"), (5, "c")):
+        store.set_name(name, node_id)
+    for a, b in ((1, 2), (1, 2), (4, 5)):
+        store.add_edge(Edge(0, a, b, _apart(store, a, b), np.eye(3) * 1e-3, EdgeType.ODOMETRY))
+    export.write_tmap2(store, tmp_path / "map.tmap2")
+    nodes = yaml.safe_load((tmp_path / "map.tmap2").read_text())["nodes"]
+    edges = [edge["edge_id"] for node in nodes for edge in node["node"]["edges"]]
+    assert len(set(edges)) == len(edges)
+    assert {"a_b_c", "a_b_c_2"} <= set(edges)
+    to = [edge["node"] for edge in next(n for n in nodes if n["node"]["name"] == "a")["node"]["edges"]]
+    assert len(set(to)) == len(to)
+
+
 def test_graphml_is_whole(store, tmp_path):
     export.write_graphml(store, tmp_path / "map.graphml")
     tree = ET.parse(tmp_path / "map.graphml").getroot()  # noqa: S314 - just written
@@ -193,7 +322,24 @@ def test_exports_that_cannot_be_are_refused_in_one_line(tmp_path, store):
                 export.WRITERS[suffix](one, tmp_path / f"one{suffix}")
     with pytest.raises(BadInput, match="cannot be written"):
         export.write_g2o(store, tmp_path / "none" / "map.g2o")
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.rglob(".*.part"))
+
+
+@pytest.mark.parametrize("suffix", [*export.WRITERS, ".png"])
+def test_an_export_that_finds_no_room_leaves_the_file_that_was_there(tmp_path, store, monkeypatch, suffix):
+    target = tmp_path / f"map{suffix}"
+    target.write_text("precious")
+
+    def half(path, data):
+        with path.open("wb") as file:
+            file.write(data[:9])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.write_bytes", half)
+    with pytest.raises(BadInput, match=r"cannot be written .* space left"):
+        (export.WRITERS | {".png": write_png})[suffix](store, target)
+    assert target.read_text() == "precious"
+    assert not list(tmp_path.glob(".*"))
 
 
 def test_info_counts_what_is_there(store):
