@@ -9,9 +9,14 @@ from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
-from drivers.errors import DriverError, PortClosed, PortError, WrongDevice
-from drivers.identify import WrongDeviceSeen
-from drivers.port import BytePort
+from lemtomap.drivers.errors import (
+    DriverError,
+    PortClosed,
+    PortError,
+    WrongDevice,
+)
+from lemtomap.drivers.identify import WrongDeviceSeen
+from lemtomap.drivers.port import BytePort
 
 E = TypeVar("E")
 

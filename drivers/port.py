@@ -10,7 +10,14 @@ from typing import Final, Protocol
 import serial
 from serial_asyncio_fast import SerialTransport, create_serial_connection
 
-from drivers.errors import PortBroken, PortBusy, PortClosed, PortDenied, PortError, PortMissing
+from lemtomap.drivers.errors import (
+    PortBroken,
+    PortBusy,
+    PortClosed,
+    PortDenied,
+    PortError,
+    PortMissing,
+)
 
 KOBUKI_BAUD: Final = 115200  # protocol.rst
 HOKUYO_BAUD: Final = 115200  # without effect over USB

@@ -13,7 +13,13 @@ from lemtomap.displacement import Watch
 from lemtomap.grid import GridSlam
 from lemtomap.topo.events import LevelChanged, NavEvent
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.types import GridView, MapView, Odometry, Scan, SlamUpdate
+from lemtomap.types import (
+    GridView,
+    MapView,
+    Odometry,
+    Scan,
+    SlamUpdate,
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,26 +11,50 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.hokuyo.events import LaserScan
-from drivers.hokuyo.session import HokuyoEvent
-from drivers.kobuki.battery import Level as BatteryLevel
-from drivers.kobuki.docking import Docking
-from drivers.kobuki.events import BumperEvent, CliffEvent, KobukiSample, LinkUp
-from drivers.kobuki.session import KobukiEvent
+from lemtomap.drivers.hokuyo.events import LaserScan
+from lemtomap.drivers.hokuyo.session import HokuyoEvent
+from lemtomap.drivers.kobuki.battery import Level as BatteryLevel
+from lemtomap.drivers.kobuki.events import (
+    BumperEvent,
+    CliffEvent,
+    KobukiSample,
+    LinkUp,
+)
+from lemtomap.drivers.kobuki.session import KobukiEvent
 from lemtomap.nav.types import ContactKind, NavState
 from lemtomap.odometry import OdometryBuffer, WheelGyroOdometry
+from lemtomap.robot.config import RobotConfig
+from lemtomap.robot.devices import bridge
+from lemtomap.robot.devices.device_log import describe_event
+from lemtomap.robot.devices.indicators import Condition, Indicators, Signal
+from lemtomap.robot.devices.recording import HOKUYO, KOBUKI
+from lemtomap.robot.exchange import (
+    BaseStatus,
+    Exchange,
+    Level,
+    TimedScan,
+)
+from lemtomap.robot.motion.docking import Docking
+from lemtomap.robot.motion.retreat import Retreat
+from lemtomap.robot.motion.safety import (
+    Allowed,
+    Evidence,
+    Reason,
+    SafetyGate,
+    Sides,
+)
+from lemtomap.robot.motion.velocity import (
+    DOCKING,
+    NAVIGATION,
+    SAFETY,
+    TELEOP,
+    VelocityMux,
+    VelocitySmoother,
+    Wish,
+)
+from lemtomap.robot.motion.watchdog import Watchdog
 from lemtomap.se2 import Pose
 from lemtomap.types import Odometry, Scan, Twist
-from robot import bridge
-from robot.config import RobotConfig
-from robot.exchange import BaseStatus, Exchange, Level, TimedScan
-from robot.feedback import Condition, Indicators, Signal
-from robot.notes import describe_event
-from robot.recording import HOKUYO, KOBUKI
-from robot.reflex import Retreat
-from robot.safety import Allowed, Evidence, Reason, SafetyGate, Sides
-from robot.velocity import DOCKING, NAVIGATION, SAFETY, TELEOP, VelocityMux, VelocitySmoother, Wish
-from robot.watchdog import Watchdog
 
 SCAN_PATIENCE_S = 0.3  # a scan whose odometry has not come by then belongs to a silent base
 

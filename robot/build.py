@@ -7,17 +7,17 @@ from lemtomap.errors import BadSetting
 from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam
 from lemtomap.nav.navigator import Navigator
 from lemtomap.pipeline import Mapper
+from lemtomap.robot.base import BaseStep
+from lemtomap.robot.config import RobotConfig
+from lemtomap.robot.core import RobotCore
+from lemtomap.robot.exchange import Exchange
+from lemtomap.robot.mapping import MappingStep
+from lemtomap.robot.navigating import NavigationStep
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.pruning import prune
-from lemtomap.topo.reader import TopoReader
-from lemtomap.topo.store import TopoStore
-from robot.base import BaseStep
-from robot.config import RobotConfig
-from robot.core import RobotCore
-from robot.exchange import Exchange
-from robot.mapping import MappingStep
-from robot.navigating import NavigationStep
+from lemtomap.topo.whole.pruning import prune
 
 
 def build_slam(name: str, config: RobotConfig, seed: int) -> GridSlam:

@@ -22,11 +22,17 @@ from lemtomap.errors import BadSetting
 from lemtomap.grid.config import SlamConfig
 from lemtomap.nav.config import NavConfig
 from lemtomap.odometry import OdometryConfig
+from lemtomap.robot.devices.ports import (
+    HOKUYO,
+    KOBUKI,
+    ListPorts,
+    describe,
+    matches_identity,
+)
+from lemtomap.robot.motion.safety import SafetyLimits
+from lemtomap.robot.motion.velocity import SmootherConfig
 from lemtomap.settings import Range, range_of, within
 from lemtomap.topo.config import TopoConfig
-from robot.ports import HOKUYO, KOBUKI, ListPorts, describe, matches_identity
-from robot.safety import SafetyLimits
-from robot.velocity import SmootherConfig
 
 Key = tuple[str, ...]
 

@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from drivers.hokuyo.session import HokuyoEvent
-from drivers.kobuki.session import KobukiEvent
-from robot.base import BaseStep, Commands
-from robot.exchange import Exchange, TimedScan
-from robot.mapping import MappingStep
-from robot.navigating import NavigationStep
+from lemtomap.drivers.hokuyo.session import HokuyoEvent
+from lemtomap.drivers.kobuki.session import KobukiEvent
+from lemtomap.robot.base import BaseStep, Commands
+from lemtomap.robot.exchange import Exchange, TimedScan
+from lemtomap.robot.mapping import MappingStep
+from lemtomap.robot.navigating import NavigationStep
 
 NAVIGATION_PERIOD_S = 0.1  # design, section 4
 

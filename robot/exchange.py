@@ -7,14 +7,14 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from drivers.kobuki.docking import DockingOutput
 from lemtomap.nav.types import Contact, NavOutput, Sighting
+from lemtomap.robot.devices.mapped_scan import MappedScan
+from lemtomap.robot.mailbox import BoundedQueue, Latest
+from lemtomap.robot.motion.docking import DockingOutput
+from lemtomap.robot.motion.safety import Allowed, Reason
+from lemtomap.robot.motion.velocity import Wish
 from lemtomap.topo.events import NavEvent
 from lemtomap.types import MapView, Odometry, Scan
-from robot.mailbox import BoundedQueue, Latest
-from robot.mapped import MappedScan
-from robot.safety import Allowed, Reason
-from robot.velocity import Wish
 
 SCANS_WAITING = 4  # a mapper that is later than this gains nothing from older scans
 EVENTS_WAITING = 1000

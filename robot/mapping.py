@@ -1,9 +1,9 @@
 """The mapping part of the robot: a scan in, a snapshot of the map out. One scan at a time."""
 
 from lemtomap.pipeline import Mapper
+from lemtomap.robot.devices.mapped_scan import MappedScan
+from lemtomap.robot.exchange import Exchange, Level, TimedScan
 from lemtomap.types import MapView
-from robot.exchange import Exchange, Level, TimedScan
-from robot.mapped import MappedScan
 
 
 class MappingStep:

@@ -6,11 +6,16 @@ from typing import Protocol
 
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal
+from lemtomap.robot.exchange import (
+    Exchange,
+    Level,
+    MissionState,
+    MissionStatus,
+)
+from lemtomap.robot.missions.missions import Idle, Mission, Moment
+from lemtomap.robot.missions.relocalise import Finder
 from lemtomap.topo.events import LevelChanged
 from lemtomap.types import MapView, RouteGraph, Twist
-from robot.exchange import Exchange, Level, MissionState, MissionStatus
-from robot.finding import Finder
-from robot.missions import Idle, Mission, Moment
 
 
 class ClosableGraph(RouteGraph, Protocol):

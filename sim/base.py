@@ -5,12 +5,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim import dock
-from sim.body import CLIFF_DROP_M, MAX_WHEEL_MPS, Body, BodyConfig, BodyState
-from sim.gyro import Gyro, GyroConfig
-from sim.kobuki import BaseReadings, KobukiConfig, KobukiFirmware
-from sim.scene import Contact, Scene
-from sim.world import World
+from lemtomap.sim import dock
+from lemtomap.sim.body import (
+    CLIFF_DROP_M,
+    MAX_WHEEL_MPS,
+    Body,
+    BodyConfig,
+    BodyState,
+)
+from lemtomap.sim.gyro import Gyro, GyroConfig
+from lemtomap.sim.kobuki import BaseReadings, KobukiConfig, KobukiFirmware
+from lemtomap.sim.scene import Contact, Scene
+from lemtomap.sim.world import World
 
 PERIOD_S = 0.020
 TICKS_PER_M = 11724.41658029856624751591  # section 6

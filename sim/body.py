@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.scene import Contact, Scene
-from sim.world import Pose2
+from lemtomap.sim.scene import Contact, Scene
+from lemtomap.sim.world import Pose2
 
 HALF_TRACK_M = 0.115  # wheels at y = +-0.115 m
 MAX_WHEEL_MPS = 0.70

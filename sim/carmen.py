@@ -1,6 +1,6 @@
 """Tours recorded as CARMEN logs that `lemtomap map` and other SLAM programs read.
 
-    python -m sim.carmen WORLD OUT.log [SECONDS [SEED]]
+    python -m lemtomap.sim.carmen WORLD OUT.log [SECONDS [SEED]]
 
 FLASER lines have no angles and no time for each beam: n beams cover 180 degrees at once. So each scan is
 moved to the pose of its middle beam (the URG takes 67 ms for its 240 degrees) and the 513 directions from -90
@@ -18,13 +18,23 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import worlds
-from sim.base import TICKS_PER_M
-from sim.errors import BadWorld
-from sim.hokuyo import FIRST_STEP, FRONT_STEP, LAST_STEP, SLITS
-from sim.simulator import Simulator
-from sim.tours import SMALL_S, Tour, drive, plan_tour
-from sim.urg import ANGLES_RAD
+from lemtomap.sim import worlds
+from lemtomap.sim.base import TICKS_PER_M
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.hokuyo import (
+    FIRST_STEP,
+    FRONT_STEP,
+    LAST_STEP,
+    SLITS,
+)
+from lemtomap.sim.simulator import Simulator
+from lemtomap.sim.tours import (
+    SMALL_S,
+    Tour,
+    drive,
+    plan_tour,
+)
+from lemtomap.sim.urg import ANGLES_RAD
 
 COUNT = SLITS // 2 + 1
 NO_RETURN_M = 8.0

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.body import BodyState
-from sim.scene import Scene
+from lemtomap.sim.body import BodyState
+from lemtomap.sim.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,8 @@
 
 import math
 
-from sim.scene import BODY_RADIUS_M, Scene
-from sim.world import Pose2
+from lemtomap.sim.scene import BODY_RADIUS_M, Scene
+from lemtomap.sim.world import Pose2
 
 NEAR_LEFT, NEAR_CENTRE, NEAR_RIGHT, FAR_CENTRE, FAR_LEFT, FAR_RIGHT = 0x01, 0x02, 0x04, 0x08, 0x10, 0x20
 NEAR_M, FAR_M = 0.6, 5.0  # working area about 2 m x 5 m

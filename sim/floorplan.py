@@ -4,13 +4,26 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from sim.errors import BadWorld
-from sim.faults import Faults
-from sim.raster import SPAWN_CLEARANCE_M, clearance_m, find_spawn, rasterise
-from sim.world import Box, Door, GroundTruth, Pose2, Room, Surface, World
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.faults import Faults
+from lemtomap.sim.raster import (
+    SPAWN_CLEARANCE_M,
+    clearance_m,
+    find_spawn,
+    rasterise,
+)
+from lemtomap.sim.world import (
+    Box,
+    Door,
+    GroundTruth,
+    Pose2,
+    Room,
+    Surface,
+    World,
+)
 
 if TYPE_CHECKING:
-    from sim.movers import Mover
+    from lemtomap.sim.movers import Mover
 
 WALL_THICKNESS_M = 0.12
 WALL_HEIGHT_M = 2.4

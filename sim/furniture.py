@@ -2,7 +2,7 @@
 
 import math
 
-from sim.world import Box, Surface
+from lemtomap.sim.world import Box, Surface
 
 LEG_M = 0.02  # half a leg's width
 

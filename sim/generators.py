@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim import furniture
-from sim.floorplan import FloorPlan
-from sim.movers import Person
-from sim.world import World
+from lemtomap.sim import furniture
+from lemtomap.sim.floorplan import FloorPlan
+from lemtomap.sim.movers import Person
+from lemtomap.sim.world import World
 
 CORRIDOR_M = 2.0
 ROOM_DEPTH_M = (3.6, 4.6)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.body import BodyState
+from lemtomap.sim.body import BodyState
 
 DPS_PER_DIGIT = 0.00875  # +-250 deg/s range (section 3.7)
 SAMPLE_HZ = 104.0  # measured on a real robot (section 16, #367)

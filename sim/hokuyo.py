@@ -10,8 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import scip
-from sim.hokuyo_stream import Stream, check_range, cut, remaining
+from lemtomap.sim import scip
+from lemtomap.sim.hokuyo_stream import (
+    Stream,
+    check_range,
+    cut,
+    remaining,
+)
 
 FIRST_STEP, FRONT_STEP, LAST_STEP, SLITS = 44, 384, 725, 1024
 """Steps with data are FIRST..LAST, 682 of them; 0..768 may be asked for, 1024 make a full turn."""

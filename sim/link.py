@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.errors import Unplugged
-from sim.faults import LinkFaults
+from lemtomap.sim.errors import Unplugged
+from lemtomap.sim.faults import LinkFaults
 
 MAX_WAITING = 1 << 16  # bytes a host that never reads may let pile up, as a tty buffer would
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from sim.world import Box, Pose2, Surface
+from lemtomap.sim.world import Box, Pose2, Surface
 
 NOWHERE: Pose2 = (1e4, 1e4, 0.0)
 """Where a thing is that is not there."""

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from sim import furniture
-from sim.floorplan import FloorPlan
-from sim.world import Box, World
+from lemtomap.sim import furniture
+from lemtomap.sim.floorplan import FloorPlan
+from lemtomap.sim.world import Box, World
 
 LENGTH_M, DEPTH_M = 16.0, 10.0
 SOUTH_EDGES, SOUTH_DOORS = (0.0, 4.2, 7.6, 12.0, 16.0), (2.9, 5.4, 11.0, 13.2)

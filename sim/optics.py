@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.world import ALBEDO, Surface
+from lemtomap.sim.world import ALBEDO, Surface
 
 NOTHING, WEAK, OTHER, NEIGHBOUR, TWO_WAVES = 0, 1, 6, 7, 8
 """Error codes (hokuyo-scip, section 7.1)."""

@@ -1,6 +1,6 @@
 """Pictures of worlds from above: walls, furniture, rooms, doors, spawn, dock, and a track.
 
-python -m sim.picture OUT_DIR [WORLD ...]     one PNG each, all built-in worlds by default
+python -m lemtomap.sim.picture OUT_DIR [WORLD ...]     one PNG each, all built-in worlds by default
 """
 
 import math
@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import worlds
-from sim.errors import BadWorld
-from sim.world import Box, Surface, World
+from lemtomap.sim import worlds
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.world import Box, Surface, World
 
 COLOURS = {
     Surface.WALL: "#333333",

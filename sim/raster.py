@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from sim.errors import BadWorld
-from sim.world import Box, Pose2, Raster
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.world import Box, Pose2, Raster
 
 SPAWN_CLEARANCE_M = 0.45  # body radius 0.178 m and room to turn and look around
 

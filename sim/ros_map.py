@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 from scipy import ndimage
 
-from sim.errors import BadWorld
-from sim.raster import SPAWN_CLEARANCE_M, boxes_from_raster, clearance_m, connected, find_spawn
-from sim.ros_truth import read_truth
-from sim.world import Pose2, Raster, World
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.raster import (
+    SPAWN_CLEARANCE_M,
+    boxes_from_raster,
+    clearance_m,
+    connected,
+    find_spawn,
+)
+from lemtomap.sim.ros_truth import read_truth
+from lemtomap.sim.world import Pose2, Raster, World
 
 WALL_HEIGHT_M = 1.0
 SOLID_M2 = 0.25  # unmapped ground of that size is what nobody could look into; less is a speck of the mapping

@@ -9,8 +9,13 @@ from typing import Any
 
 import yaml
 
-from sim.errors import BadWorld
-from sim.world import Door, GroundTruth, Raster, Room
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.world import (
+    Door,
+    GroundTruth,
+    Raster,
+    Room,
+)
 
 
 def read_truth(folder: Path, raster: Raster) -> GroundTruth:

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from sim.errors import BadWorld
-from sim.raster import clearance_m
-from sim.world import Raster
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.raster import clearance_m
+from lemtomap.sim.world import Raster
 
 CELL_M = 0.10  # planning step; finer rasters are thinned
 KEEP_OFF_M = 0.27  # body radius 0.178 m and 9 cm to spare

@@ -10,8 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import NoPhysics, SimError
-from sim.world import ALBEDO, Box, Pose2, Surface, World
+from lemtomap.sim.errors import NoPhysics, SimError
+from lemtomap.sim.world import (
+    ALBEDO,
+    Box,
+    Pose2,
+    Surface,
+    World,
+)
 
 
 @contextlib.contextmanager

@@ -1,6 +1,6 @@
 """The fake hardware in real time on two pseudo-terminals, for any program that speaks the protocols.
 
-    python -m sim.serve --world office
+    python -m lemtomap.sim.serve --world office
 
 The first line of output is {"kobuki": "/dev/pts/3", "hokuyo": "/dev/pts/4"}; it serves until interrupted. Its
 last line is the truth of the run: {"path_m": ..., "contacts": ..., "contact_s": ..., "pose": [x, y, yaw]}.
@@ -19,11 +19,11 @@ from pathlib import Path
 from types import FrameType
 from typing import TextIO
 
-from sim import worlds
-from sim.errors import SimError, Unplugged
-from sim.link import HostPort
-from sim.pty_port import PtyPort
-from sim.simulator import STEP_S, Simulator
+from lemtomap.sim import worlds
+from lemtomap.sim.errors import SimError, Unplugged
+from lemtomap.sim.link import HostPort
+from lemtomap.sim.pty_port import PtyPort
+from lemtomap.sim.simulator import STEP_S, Simulator
 
 LATE_S = 0.25  # a machine this far behind gives up the lost time instead of racing after it
 TRUTH_PERIOD_S = 0.1
@@ -173,7 +173,9 @@ def _say(answer: dict[str, object]) -> None:
 
 def main() -> int:
     """Read the arguments and serve."""
-    parser = argparse.ArgumentParser(prog="python -m sim.serve", description="The fake hardware alone.")
+    parser = argparse.ArgumentParser(
+        prog="python -m lemtomap.sim.serve", description="The fake hardware alone."
+    )
     parser.add_argument(
         "--world", default=worlds.names()[0], help="a built-in world, a map .yaml or a world .toml"
     )

@@ -6,15 +6,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.base import BIT_RATE, Base, BaseConfig
-from sim.body import BodyState
-from sim.depth import DepthCamera, DepthConfig
-from sim.faults import Faults
-from sim.hokuyo import HokuyoConfig, HokuyoFirmware
-from sim.link import HostPort, Link
-from sim.scene import Scene
-from sim.urg import Urg, UrgConfig
-from sim.world import World
+from lemtomap.sim.base import BIT_RATE, Base, BaseConfig
+from lemtomap.sim.body import BodyState
+from lemtomap.sim.depth import DepthCamera, DepthConfig
+from lemtomap.sim.faults import Faults
+from lemtomap.sim.hokuyo import HokuyoConfig, HokuyoFirmware
+from lemtomap.sim.link import HostPort, Link
+from lemtomap.sim.scene import Scene
+from lemtomap.sim.urg import Urg, UrgConfig
+from lemtomap.sim.world import World
 
 STEP_S = 0.010  # physics; at 0.7 m/s the body moves 7 mm
 USB_S = 0.001  # one USB frame

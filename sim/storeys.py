@@ -7,9 +7,9 @@ east landing; both landings of each level have a door into the floor, so the way
 import math
 from collections.abc import Iterable
 
-from sim.floorplan import FloorPlan
-from sim.office import DEPTH_M, LENGTH_M, draw_office
-from sim.world import Box, Surface, World
+from lemtomap.sim.floorplan import FloorPlan
+from lemtomap.sim.office import DEPTH_M, LENGTH_M, draw_office
+from lemtomap.sim.world import Box, Surface, World
 
 LEVEL_M = 1.3  # storey height: 5.7 degrees over the ramp; Kobuki climbs 12
 SLAB_M = 0.1

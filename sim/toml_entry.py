@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim.errors import BadWorld
+from lemtomap.sim.errors import BadWorld
 
 LINK_KEYS = frozenset({"lose_byte", "flip_bit", "burst_s", "delay_s", "jitter_s", "unplugged"})
 KEYS: dict[str, tuple[frozenset[str], frozenset[str]]] = {

@@ -41,14 +41,19 @@ from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
-from sim import furniture
-from sim.errors import BadWorld
-from sim.faults import Faults, LinkFaults, Window
-from sim.floorplan import FloorPlan
-from sim.movers import Appearing, Person, SwingDoor
-from sim.ros_map import load_ros_map
-from sim.toml_entry import KEYS, Entry
-from sim.world import Box, Pose2, Surface, World
+from lemtomap.sim import furniture
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.faults import Faults, LinkFaults, Window
+from lemtomap.sim.floorplan import FloorPlan
+from lemtomap.sim.movers import Appearing, Person, SwingDoor
+from lemtomap.sim.ros_map import load_ros_map
+from lemtomap.sim.toml_entry import KEYS, Entry
+from lemtomap.sim.world import (
+    Box,
+    Pose2,
+    Surface,
+    World,
+)
 
 Area = tuple[float, float, float, float]
 FLOOR_SLAB_M = 0.2

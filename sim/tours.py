@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.route import RoutePlanner, path_length_m
-from sim.simulator import Simulator
-from sim.world import World
+from lemtomap.sim.route import RoutePlanner, path_length_m
+from lemtomap.sim.simulator import Simulator
+from lemtomap.sim.world import World
 
 SMALL_S, LARGE_S = 180.0, 660.0  # about 3 and 11 minutes (T5-2-1)
 COMMAND_S = 0.02

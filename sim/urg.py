@@ -7,12 +7,24 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.body import BodyState
-from sim.hokuyo import FIRST_STEP, FRONT_STEP, LAST_STEP, NOT_MEASURABLE, SLITS
-from sim.hokuyo_stream import STEPS
-from sim.optics import NOTHING, WEAK, Light, OpticsConfig, measure
-from sim.scene import Scene
-from sim.world import Pose2
+from lemtomap.sim.body import BodyState
+from lemtomap.sim.hokuyo import (
+    FIRST_STEP,
+    FRONT_STEP,
+    LAST_STEP,
+    NOT_MEASURABLE,
+    SLITS,
+)
+from lemtomap.sim.hokuyo_stream import STEPS
+from lemtomap.sim.optics import (
+    NOTHING,
+    WEAK,
+    Light,
+    OpticsConfig,
+    measure,
+)
+from lemtomap.sim.scene import Scene
+from lemtomap.sim.world import Pose2
 
 BEAMS = LAST_STEP - FIRST_STEP + 1
 TRACK = 16  # physics steps remembered: more than one turn

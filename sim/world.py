@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.faults import Faults
+from lemtomap.sim.faults import Faults
 
 if TYPE_CHECKING:
-    from sim.movers import Mover
+    from lemtomap.sim.movers import Mover
 
 Pose2 = tuple[float, float, float]
 """x m, y m, yaw rad."""

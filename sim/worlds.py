@@ -6,7 +6,7 @@
     offices:60:7           a floor of 60 rooms, seed 7
     plan.yaml, plan.yaml@4 a ROS map, or copies of it side by side
     office#1, home#1       the same on another day: some furniture stands elsewhere
-    home.toml              a description (sim.toml_world)
+    home.toml              a description (lemtomap.sim.toml_world)
 
 `names()` lists the built-in ones, `describe` says what each is.
 """
@@ -15,13 +15,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sim.errors import BadWorld
-from sim.generators import campus, corridor, loop, offices
-from sim.office import office
-from sim.ros_map import load_ros_map, side_by_side
-from sim.storeys import storeys
-from sim.toml_world import load_toml
-from sim.world import World
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.generators import (
+    campus,
+    corridor,
+    loop,
+    offices,
+)
+from lemtomap.sim.office import office
+from lemtomap.sim.ros_map import load_ros_map, side_by_side
+from lemtomap.sim.storeys import storeys
+from lemtomap.sim.toml_world import load_toml
+from lemtomap.sim.world import World
 
 MAX_COPIES = 64
 MAX_DAY = 9999

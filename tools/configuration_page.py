@@ -16,8 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from lemtomap.robot.config import RobotConfig
 from lemtomap.settings import Range, range_of
-from robot.config import RobotConfig
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "configuration.md"
 HEAD = """# Settings

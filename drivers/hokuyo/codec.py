@@ -13,8 +13,14 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.hokuyo.numbers import BadDigitError, decode_number, digits_of, join_digits, line_sum
-from drivers.hokuyo.packets import (
+from lemtomap.drivers.hokuyo.numbers import (
+    BadDigitError,
+    decode_number,
+    digits_of,
+    join_digits,
+    line_sum,
+)
+from lemtomap.drivers.hokuyo.packets import (
     ACCEPTED,
     BLOCK,
     DATA,

@@ -1,9 +1,9 @@
 """One attempt to bring a sensor, in whatever state it is, to streaming scans."""
 
-from drivers.hokuyo import commands
-from drivers.hokuyo.codec import Reply
-from drivers.hokuyo.events import SensorInfo
-from drivers.hokuyo.packets import (
+from lemtomap.drivers.hokuyo import commands
+from lemtomap.drivers.hokuyo.codec import Reply
+from lemtomap.drivers.hokuyo.events import SensorInfo
+from lemtomap.drivers.hokuyo.packets import (
     ACCEPTED,
     ClockReading,
     Info,
@@ -12,9 +12,9 @@ from drivers.hokuyo.packets import (
     Status,
     explain_status,
 )
-from drivers.hokuyo.scans import ScanMaker, View
-from drivers.hokuyo.steps import QUESTIONS, Step
-from drivers.hokuyo.timesync import TimeSync
+from lemtomap.drivers.hokuyo.scans import ScanMaker, View
+from lemtomap.drivers.hokuyo.steps import QUESTIONS, Step
+from lemtomap.drivers.hokuyo.timesync import TimeSync
 
 _UNDEFINED = "0E"
 _BUSY = "0B"

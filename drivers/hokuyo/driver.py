@@ -2,9 +2,14 @@
 
 from collections.abc import Awaitable, Callable
 
-from drivers.driver import Driver, DriverConfig, PortLost, PortOpened
-from drivers.hokuyo.session import HokuyoEvent, HokuyoSession
-from drivers.port import BytePort
+from lemtomap.drivers.driver import (
+    Driver,
+    DriverConfig,
+    PortLost,
+    PortOpened,
+)
+from lemtomap.drivers.hokuyo.session import HokuyoEvent, HokuyoSession
+from lemtomap.drivers.port import BytePort
 
 
 class HokuyoDriver(Driver[HokuyoEvent]):

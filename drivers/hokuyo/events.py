@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers import identify
-from drivers.hokuyo.packets import SensorParameters
+from lemtomap.drivers import identify
+from lemtomap.drivers.hokuyo.packets import SensorParameters
 
 
 @dataclass(frozen=True, slots=True)

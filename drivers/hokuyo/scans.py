@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.hokuyo.commands import ScanRequest
-from drivers.hokuyo.events import LaserScan
-from drivers.hokuyo.packets import ScanFrame, SensorParameters
+from lemtomap.drivers.hokuyo.commands import ScanRequest
+from lemtomap.drivers.hokuyo.events import LaserScan
+from lemtomap.drivers.hokuyo.packets import ScanFrame, SensorParameters
 
 _FAR_SENSOR_MM = 20000  # UTM-30LX and its kin: code 1 = nothing (hokuyo_node); URG-04LX: code 0
 

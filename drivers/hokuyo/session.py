@@ -5,11 +5,11 @@ task.
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from drivers.clock import ClockConfig, DeviceClock
-from drivers.hokuyo import commands
-from drivers.hokuyo.codec import Decoder, Reply
-from drivers.hokuyo.connect import Connection
-from drivers.hokuyo.events import (
+from lemtomap.drivers.clock import ClockConfig, DeviceClock
+from lemtomap.drivers.hokuyo import commands
+from lemtomap.drivers.hokuyo.codec import Decoder, Reply
+from lemtomap.drivers.hokuyo.connect import Connection
+from lemtomap.drivers.hokuyo.events import (
     LaserDown,
     LaserFault,
     LaserScan,
@@ -18,7 +18,7 @@ from drivers.hokuyo.events import (
     SensorInfo,
     WrongDeviceSeen,
 )
-from drivers.hokuyo.packets import (
+from lemtomap.drivers.hokuyo.packets import (
     CHECKED_NORMAL,
     STAMP_BITS,
     BadReply,
@@ -29,9 +29,14 @@ from drivers.hokuyo.packets import (
     is_checking,
     is_trouble,
 )
-from drivers.hokuyo.scans import ScanMaker, View
-from drivers.hokuyo.steps import Step
-from drivers.identify import HOKUYO, excerpt, name_device, name_talker
+from lemtomap.drivers.hokuyo.scans import ScanMaker, View
+from lemtomap.drivers.hokuyo.steps import Step
+from lemtomap.drivers.identify import (
+    HOKUYO,
+    excerpt,
+    name_device,
+    name_talker,
+)
 
 HokuyoEvent: TypeAlias = (
     LaserScan | SensorInfo | LaserFault | LaserWell | LaserUp | LaserDown | WrongDeviceSeen | BadReply

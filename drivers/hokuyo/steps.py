@@ -9,7 +9,7 @@ power).
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from drivers.hokuyo import commands
+from lemtomap.drivers.hokuyo import commands
 
 
 class Step(Enum):

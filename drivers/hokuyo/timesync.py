@@ -1,6 +1,6 @@
 """The offset of the sensor's clock from a few two-way exchanges (TM1)."""
 
-from drivers.hokuyo.packets import STAMP_BITS
+from lemtomap.drivers.hokuyo.packets import STAMP_BITS
 
 _TICK_S = 1e-3
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Generic, TypeVar
 
-from drivers.kobuki.packets import CHARGER_ADAPTER, Charge
+from lemtomap.drivers.kobuki.packets import CHARGER_ADAPTER, Charge
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,14 @@ import functools
 import operator
 from typing import Any, Final
 
-from drivers.kobuki.commands import Command
-from drivers.kobuki.packets import HEADER, MAX_PAYLOAD, BadFrame, Feedback
-from drivers.kobuki.subpayloads import SUB_PAYLOADS, ImpossibleValueError
+from lemtomap.drivers.kobuki.commands import Command
+from lemtomap.drivers.kobuki.packets import (
+    HEADER,
+    MAX_PAYLOAD,
+    BadFrame,
+    Feedback,
+)
+from lemtomap.drivers.kobuki.subpayloads import SUB_PAYLOADS, ImpossibleValueError
 
 _OVERHEAD: Final = 4  # header, LEN, checksum
 _MIN_PAYLOAD: Final = 17  # ID 1 alone

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from typing import Protocol
 
-from drivers.kobuki.packets import WHEEL_BASE_M, Gains
+from lemtomap.drivers.kobuki.packets import WHEEL_BASE_M, Gains
 
 
 class Command(Protocol):

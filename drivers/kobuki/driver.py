@@ -2,9 +2,14 @@
 
 from collections.abc import Awaitable, Callable
 
-from drivers.driver import Driver, DriverConfig, PortLost, PortOpened
-from drivers.kobuki.session import KobukiEvent, KobukiSession
-from drivers.port import BytePort
+from lemtomap.drivers.driver import (
+    Driver,
+    DriverConfig,
+    PortLost,
+    PortOpened,
+)
+from lemtomap.drivers.kobuki.session import KobukiEvent, KobukiSession
+from lemtomap.drivers.port import BytePort
 
 
 class KobukiDriver(Driver[KobukiEvent]):

@@ -11,9 +11,9 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers import identify
-from drivers.kobuki.battery import Battery, PowerChange
-from drivers.kobuki.packets import (
+from lemtomap.drivers import identify
+from lemtomap.drivers.kobuki.battery import Battery, PowerChange
+from lemtomap.drivers.kobuki.packets import (
     Bumper,
     Button,
     Cliff,

@@ -3,10 +3,15 @@
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.kobuki.codec import encode
-from drivers.kobuki.commands import Extra, GetGains, RequestExtra
-from drivers.kobuki.events import BaseInfo, Compatibility, GainsReport
-from drivers.kobuki.packets import Feedback, Gains, Udid, Version
+from lemtomap.drivers.kobuki.codec import encode
+from lemtomap.drivers.kobuki.commands import Extra, GetGains, RequestExtra
+from lemtomap.drivers.kobuki.events import BaseInfo, Compatibility, GainsReport
+from lemtomap.drivers.kobuki.packets import (
+    Feedback,
+    Gains,
+    Udid,
+    Version,
+)
 
 GAINS_SINCE: Final = Version(1, 2, 0)
 _COMPATIBLE_MAJOR: Final = 1  # kobuki_core, version policy

@@ -4,8 +4,16 @@ lacks.
 
 from collections.abc import Iterable
 
-from drivers.kobuki.codec import encode
-from drivers.kobuki.commands import ALL_POWER, GeneralOutput, Led, Output, Sound, SoundSequence, Tune
+from lemtomap.drivers.kobuki.codec import encode
+from lemtomap.drivers.kobuki.commands import (
+    ALL_POWER,
+    GeneralOutput,
+    Led,
+    Output,
+    Sound,
+    SoundSequence,
+    Tune,
+)
 
 _LED_SHIFT = {1: 8, 2: 10}
 _DIGITAL = (Output.DO0, Output.DO1, Output.DO2, Output.DO3)

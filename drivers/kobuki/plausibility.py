@@ -9,7 +9,7 @@ robot, reset odometry).
 
 from dataclasses import dataclass
 
-from drivers.kobuki.packets import RAW_GYRO_DPS_PER_DIGIT, Feedback
+from lemtomap.drivers.kobuki.packets import RAW_GYRO_DPS_PER_DIGIT, Feedback
 
 
 @dataclass(frozen=True, slots=True)

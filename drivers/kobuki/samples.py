@@ -7,8 +7,8 @@ from typing import Final, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.kobuki.battery import Battery
-from drivers.kobuki.events import (
+from lemtomap.drivers.kobuki.battery import Battery
+from lemtomap.drivers.kobuki.events import (
     BumperEvent,
     ButtonEvent,
     CliffEvent,
@@ -17,7 +17,7 @@ from drivers.kobuki.events import (
     OverCurrentEvent,
     WheelDropEvent,
 )
-from drivers.kobuki.packets import (
+from lemtomap.drivers.kobuki.packets import (
     RAW_GYRO_DPS_PER_DIGIT,
     Bumper,
     Button,

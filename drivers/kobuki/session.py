@@ -4,12 +4,24 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from drivers.clock import ClockConfig, DeviceClock
-from drivers.identify import KOBUKI, excerpt, name_device, name_talker
-from drivers.kobuki.battery import BatteryConfig, BatteryModel
-from drivers.kobuki.codec import Decoder, encode
-from drivers.kobuki.commands import STOP, BaseControl, Led, Output, SetGains, Tune
-from drivers.kobuki.events import (
+from lemtomap.drivers.clock import ClockConfig, DeviceClock
+from lemtomap.drivers.identify import (
+    KOBUKI,
+    excerpt,
+    name_device,
+    name_talker,
+)
+from lemtomap.drivers.kobuki.battery import BatteryConfig, BatteryModel
+from lemtomap.drivers.kobuki.codec import Decoder, encode
+from lemtomap.drivers.kobuki.commands import (
+    STOP,
+    BaseControl,
+    Led,
+    Output,
+    SetGains,
+    Tune,
+)
+from lemtomap.drivers.kobuki.events import (
     BaseInfo,
     GainsReport,
     KobukiSample,
@@ -18,11 +30,11 @@ from drivers.kobuki.events import (
     PowerEvent,
     WrongDeviceSeen,
 )
-from drivers.kobuki.identity import GAINS_SINCE, AskConfig, Identity
-from drivers.kobuki.packets import BadFrame, Feedback, Gains
-from drivers.kobuki.panel import Panel
-from drivers.kobuki.plausibility import FrameGate, PlausibilityConfig
-from drivers.kobuki.samples import EdgeEvent, edges, sample_of
+from lemtomap.drivers.kobuki.identity import GAINS_SINCE, AskConfig, Identity
+from lemtomap.drivers.kobuki.packets import BadFrame, Feedback, Gains
+from lemtomap.drivers.kobuki.panel import Panel
+from lemtomap.drivers.kobuki.plausibility import FrameGate, PlausibilityConfig
+from lemtomap.drivers.kobuki.samples import EdgeEvent, edges, sample_of
 
 KobukiEvent: TypeAlias = (
     KobukiSample

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from drivers.kobuki.packets import (
+from lemtomap.drivers.kobuki.packets import (
     CHARGER_ADAPTER,
     Basic,
     CliffAdc,

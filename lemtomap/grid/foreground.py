@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.grid.scan import Beams
+from lemtomap.grid.beams import Beams
 
 GAP_M = 0.3  # between neighbouring hits, at which one thing ends and another begins
 COMPACT_M = 0.8  # a person with arms and stride; a wall's end that looks so small is rare and soon grows

@@ -11,11 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.grid import particles
+from lemtomap.grid.beams import Beams
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.mapper import Tracker, roll_and_integrate
 from lemtomap.grid.matching import Match, refused
-from lemtomap.grid.motion import between, compose, odometry_drift, odometry_uncertainty
-from lemtomap.grid.scan import Beams
+from lemtomap.grid.motion import (
+    between,
+    compose,
+    odometry_drift,
+    odometry_uncertainty,
+)
 from lemtomap.grid.window import Window
 from lemtomap.se2 import Pose
 

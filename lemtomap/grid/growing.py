@@ -12,15 +12,25 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.grid.beams import Beams
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.gmapping import RollingGmapping, Visit
 from lemtomap.grid.kernels import window as kernels
 from lemtomap.grid.matching import Match
 from lemtomap.grid.motion import between, compose
-from lemtomap.grid.scan import Beams
-from lemtomap.grid.window import LookUp, Scratch, Window, percent_table
+from lemtomap.grid.window import (
+    LookUp,
+    Scratch,
+    Window,
+    percent_table,
+)
 from lemtomap.se2 import Pose
-from lemtomap.types import GridView, Odometry, Scan, SlamUpdate
+from lemtomap.types import (
+    GridView,
+    Odometry,
+    Scan,
+    SlamUpdate,
+)
 
 TILE = 20  # cells; windows move by whole tiles
 PACK_LEVEL = 1  # of zlib: most cells of a tile are alike

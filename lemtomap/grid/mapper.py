@@ -11,10 +11,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.grid.beams import Beams, ScanPreparer
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.foreground import without_foreground
+from lemtomap.grid.kernels import matching as matching_kernels
 from lemtomap.grid.matching import Match, Matcher, refused
-from lemtomap.grid.matching import kernels as matching_kernels
 from lemtomap.grid.motion import (
     HeadingTrust,
     Uncertainty,
@@ -25,10 +26,14 @@ from lemtomap.grid.motion import (
     odometry_uncertainty,
 )
 from lemtomap.grid.publish import SmoothCorrection
-from lemtomap.grid.scan import Beams, ScanPreparer
 from lemtomap.grid.window import Scratch, Window, look_up
 from lemtomap.se2 import Pose, wrap_angle
-from lemtomap.types import GridView, Odometry, Scan, SlamUpdate
+from lemtomap.types import (
+    GridView,
+    Odometry,
+    Scan,
+    SlamUpdate,
+)
 
 
 class GridSlam(Protocol):

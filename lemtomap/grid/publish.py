@@ -5,7 +5,12 @@ import math
 import numpy as np
 
 from lemtomap.grid.config import SlamConfig
-from lemtomap.grid.motion import Numbers, numbers, product, quotient
+from lemtomap.grid.motion import (
+    Numbers,
+    numbers,
+    product,
+    quotient,
+)
 from lemtomap.se2 import Pose
 
 _IDENTITY: Numbers = (0.0, 0.0, 0.0)

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.grid.beams import Beams
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.kernels import planes
+from lemtomap.grid.kernels import scan as scan_kernels
 from lemtomap.grid.kernels import window as kernels
-from lemtomap.grid.scan import Beams
-from lemtomap.grid.scan import kernels as scan_kernels
 from lemtomap.se2 import Pose, transform
 from lemtomap.types import GridView
 

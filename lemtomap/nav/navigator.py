@@ -14,14 +14,21 @@ from numpy.typing import NDArray
 from lemtomap import se2
 from lemtomap.errors import NoRoute
 from lemtomap.nav.config import NavConfig
-from lemtomap.nav.follower import Follower, Motion, Step
-from lemtomap.nav.metric import MetricPlan, reach_from
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
+from lemtomap.nav.motion.follower import Follower, Motion, Step
+from lemtomap.nav.motion.metric import MetricPlan, reach_from
+from lemtomap.nav.motion.recovery import (
+    Ladder,
+    ProgressWatch,
+    Rung,
+    WayBack,
+)
 from lemtomap.nav.outlook import FarLook, Lookout, WindowLook
-from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.sliding import Target, is_roundabout, place_of
+from lemtomap.nav.route.sliding import Target, is_roundabout, place_of
+from lemtomap.nav.route.watching import EdgeClock
+from lemtomap.nav.route.way import Moment, WayKeeper
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
     Contact,
@@ -31,8 +38,6 @@ from lemtomap.nav.types import (
     Reason,
     Sighting,
 )
-from lemtomap.nav.watching import EdgeClock
-from lemtomap.nav.way import Moment, WayKeeper
 from lemtomap.se2 import Pose
 from lemtomap.types import MapView, RouteGraph, Twist
 

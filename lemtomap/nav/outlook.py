@@ -11,15 +11,21 @@ from typing import Protocol
 
 import numpy as np
 
-from lemtomap.nav.barriers import find_barrier
 from lemtomap.nav.config import NavConfig
-from lemtomap.nav.costmap import Costs
-from lemtomap.nav.metric import MetricPlan, Reach, plan_near, plan_to, reach_from
+from lemtomap.nav.motion.costmap import Costs
+from lemtomap.nav.motion.metric import (
+    MetricPlan,
+    Reach,
+    plan_near,
+    plan_to,
+    reach_from,
+)
+from lemtomap.nav.route.barriers import find_barrier
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.sliding import Target, choose_target, is_roundabout
+from lemtomap.nav.route.sliding import Target, choose_target, is_roundabout
+from lemtomap.nav.route.way import Moment
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import CostmapView, Goal
-from lemtomap.nav.way import Moment
 from lemtomap.types import RouteEdge
 
 NEAR_HALF_M = 2.5

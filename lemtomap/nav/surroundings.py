@@ -9,9 +9,14 @@ import numpy as np
 
 from lemtomap import se2
 from lemtomap.nav.config import NavConfig
-from lemtomap.nav.costmap import Costmap, Costs, Felt
 from lemtomap.nav.motion.collision import points_now
-from lemtomap.nav.types import Contact, ContactKind, Points, Sighting
+from lemtomap.nav.motion.costmap import Costmap, Costs, Felt
+from lemtomap.nav.types import (
+    Contact,
+    ContactKind,
+    Points,
+    Sighting,
+)
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import Bumped
 from lemtomap.topo.graph import Mark

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from lemtomap.displacement import WatchConfig
 from lemtomap.errors import BadSetting
 from lemtomap.settings import within
-from lemtomap.topo.align import MatchConfig
+from lemtomap.topo.place.align import MatchConfig
 
 
 @dataclass(frozen=True, slots=True)

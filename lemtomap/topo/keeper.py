@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, inverse, transform
-from lemtomap.topo.align import HitMap, Match, match_place
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.graph import Place
 from lemtomap.topo.kernels import fitting
 from lemtomap.topo.local import LocalMap, Standing
-from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.place import decode_place, encode_place
+from lemtomap.topo.place.align import Match, match_place
+from lemtomap.topo.place.hits import HitMap
 from lemtomap.types import GridView
 
 AGEING = 0.7  # of the way a measurement stays fresh: then the place is taken, however near the robot stays

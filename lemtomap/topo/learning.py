@@ -14,8 +14,8 @@ from lemtomap.topo.events import (
     OpeningDone,
     OpeningSeen,
 )
+from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.graph import Mark, OpeningState, Placeholder
-from lemtomap.topo.paging import PagedGraph
 
 NEWEST_SHARE = 0.3  # of a traversal time in the learnt one: follows a changed habit within some five drives
 

@@ -3,9 +3,14 @@
 from dataclasses import dataclass, replace
 from typing import Self
 
-from lemtomap.se2 import Pose, between, compose, inverse
+from lemtomap.se2 import (
+    Pose,
+    between,
+    compose,
+    inverse,
+)
+from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.graph import Covariance, Edge
-from lemtomap.topo.paging import PagedGraph
 from lemtomap.types import EdgeType, SlamUpdate
 
 

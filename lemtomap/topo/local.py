@@ -12,9 +12,9 @@ import numpy as np
 
 from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file.paging import PagedGraph, Reached
 from lemtomap.topo.graph import Covariance, Edge
 from lemtomap.topo.kernels import poses as kernels
-from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.topo.solve import Problem, solve_local
 from lemtomap.types import GridView
 

@@ -10,14 +10,21 @@ from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.doubt import COVARIANCE_FLOOR, NOWHERE
 from lemtomap.topo.events import NavEvent, NothingKnownHere
-from lemtomap.topo.graph import USUAL_SPEED_MPS, Covariance, Edge, chain_covariance, reversed_covariance
+from lemtomap.topo.file.paging import PagedGraph
+from lemtomap.topo.file.store import TopoStore
+from lemtomap.topo.graph import (
+    USUAL_SPEED_MPS,
+    Covariance,
+    Edge,
+    chain_covariance,
+    reversed_covariance,
+)
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
 from lemtomap.topo.levels import Lift, put_on_level
 from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.localisation import Localisation, Now, Transform
 from lemtomap.topo.neighbours import NeighbourFinder, directly_navigable
-from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.recognition import (
     Closed,
     Confirmed,
@@ -29,11 +36,15 @@ from lemtomap.topo.recognition import (
     Revoked,
     Situation,
 )
+from lemtomap.topo.repair import take_back
 from lemtomap.topo.snapshots import Snapshots
-from lemtomap.topo.store import TopoStore
-from lemtomap.topo.trail import ScanTrail
-from lemtomap.topo.undoing import take_back
-from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
+from lemtomap.topo.whole.trail import ScanTrail
+from lemtomap.types import (
+    EdgeType,
+    GridView,
+    MapView,
+    SlamUpdate,
+)
 
 
 class TopoMapper:

@@ -8,10 +8,10 @@ import numpy as np
 
 from lemtomap.se2 import Pose, between
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file.paging import PagedGraph, Reached
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.kernels import sight
 from lemtomap.topo.local import LocalMap, Standing
-from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.types import EdgeType, GridView
 
 SEAM_SHARE = 2.0

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose
-from lemtomap.topo.align import HitMap
+from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.graph import Covariance, Edge, Place
-from lemtomap.topo.paging import PagedGraph
+from lemtomap.topo.place.hits import HitMap
 from lemtomap.types import GridView
 
 HITS_REACH_M = 14.2  # half the diagonal of a 20 m window

@@ -3,9 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.local import LocalMap
-from lemtomap.topo.paging import PagedGraph
-from lemtomap.types import EdgeType, GridView, MapView, SlamUpdate
+from lemtomap.types import (
+    EdgeType,
+    GridView,
+    MapView,
+    SlamUpdate,
+)
 
 
 class Snapshots:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Protocol
 
 from lemtomap.errors import BadLog
+from lemtomap.robot.logs import carmen, text, tinyslam
+from lemtomap.robot.logs.records import RecordedLog
 from lemtomap.types import Odometry, Scan
-from robot.logs import carmen, text, tinyslam
-from robot.logs.records import RecordedLog
 
 
 class Log(Protocol):

@@ -22,15 +22,21 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.errors import BadLog
+from lemtomap.robot.logs import numbers
+from lemtomap.robot.logs.fans import (
+    Fan,
+    UnknownFan,
+    fan_of_line,
+    fan_over,
+    fan_told,
+)
+from lemtomap.robot.logs.no_return import infer_no_return_m
+from lemtomap.robot.logs.numbers import BrokenLine
+from lemtomap.robot.logs.oddities import note_oddities
+from lemtomap.robot.logs.odometry import OdometryLines
+from lemtomap.robot.logs.records import Laser, Record, RecordedLog
+from lemtomap.robot.logs.remarks import Remarks
 from lemtomap.se2 import Pose
-from robot.logs import numbers
-from robot.logs.fans import Fan, UnknownFan, fan_of_line, fan_over, fan_told
-from robot.logs.no_return import infer_no_return_m
-from robot.logs.numbers import BrokenLine
-from robot.logs.oddities import note_oddities
-from robot.logs.odometry import OdometryLines
-from robot.logs.records import Laser, Record, RecordedLog
-from robot.logs.remarks import Remarks
 
 FARTHEST_SEEN_M = 80.0
 POSED = ("FLASER", "ROBOTLASER1")  # lines with the odometry pose in them

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robot.logs.records import Record
+from lemtomap.robot.logs.records import Record
 
 PILE_WIDTH_M = (
     0.12  # a SICK's no-return code scatters this far below its most frequent value (unit conversions)

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from lemtomap import se2
-from robot.logs.records import Record
-from robot.logs.remarks import Remarks
+from lemtomap.robot.logs.records import Record
+from lemtomap.robot.logs.remarks import Remarks
 
 TELEPORT_M, TELEPORT_RAD = 1.0, 0.7  # more than a wheeled robot does between two scans
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from lemtomap import se2
 from lemtomap.errors import BadLog
+from lemtomap.robot.logs.records import Record
+from lemtomap.robot.logs.remarks import Remarks
 from lemtomap.se2 import Pose
-from robot.logs.records import Record
-from robot.logs.remarks import Remarks
 
 FARTHEST_S = 1.0  # from a scan to the odometry next to it; robots send it several times a second
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.robot.logs.clock import tells_time
+from lemtomap.robot.logs.remarks import Remarks
 from lemtomap.se2 import Pose
 from lemtomap.types import Odometry, Scan
-from robot.logs.clock import tells_time
-from robot.logs.remarks import Remarks
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Record:
 
 @dataclass(frozen=True)
 class RecordedLog:
-    """The scans of one log; see robot.logs.Log."""
+    """The scans of one log; see lemtomap.robot.logs.Log."""
 
     path: Path
     records: Sequence[Record]

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.errors import BadLog, BadSetting
-from robot.logs import numbers
-from robot.logs.numbers import BrokenLine
-from robot.logs.oddities import note_oddities
-from robot.logs.records import Laser, Record, RecordedLog
-from robot.logs.remarks import Remarks
+from lemtomap.robot.logs import numbers
+from lemtomap.robot.logs.numbers import BrokenLine
+from lemtomap.robot.logs.oddities import note_oddities
+from lemtomap.robot.logs.records import Laser, Record, RecordedLog
+from lemtomap.robot.logs.remarks import Remarks
 
 RANGES = 682
 WHEEL_RADIUS_M = 0.077

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from drivers.clock import ClockConfig, DeviceClock
-from drivers.hokuyo.timesync import TimeSync
+from lemtomap.drivers.clock import ClockConfig, DeviceClock
+from lemtomap.drivers.hokuyo.timesync import TimeSync
 
 
 def arrivals(true_s, *, latency_s=0.008, burst_s=0.0, jitter_s=0.0, seed=0):

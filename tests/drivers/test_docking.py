@@ -4,11 +4,11 @@ import math
 import pytest
 from device_side import kobuki_feedback
 
-from drivers.kobuki.docking import Docking, DockingConfig, DockingState
-from drivers.kobuki.events import KobukiSample
-from drivers.kobuki.session import KobukiSession
-from sim import worlds
-from sim.simulator import Simulator
+from lemtomap.drivers.kobuki.events import KobukiSample
+from lemtomap.drivers.kobuki.session import KobukiSession
+from lemtomap.robot.motion.docking import Docking, DockingConfig, DockingState
+from lemtomap.sim import worlds
+from lemtomap.sim.simulator import Simulator
 
 
 def dock(spawn, config=None, dock_at=(0.35, 5.0, 0.0)):

@@ -14,13 +14,20 @@ import psutil
 import pytest
 from device_side import KOBUKI_VERSIONS, Urg, kobuki_feedback
 
-from drivers.driver import DriverConfig, PortLost, PortOpened
-from drivers.errors import PortBroken, PortBusy, PortClosed, PortDenied, PortMissing, WrongDevice
-from drivers.hokuyo.driver import HokuyoDriver
-from drivers.hokuyo.events import LaserScan, SensorInfo
-from drivers.kobuki.driver import KobukiDriver
-from drivers.kobuki.events import BaseInfo, KobukiSample
-from drivers.port import open_serial
+from lemtomap.drivers.driver import DriverConfig, PortLost, PortOpened
+from lemtomap.drivers.errors import (
+    PortBroken,
+    PortBusy,
+    PortClosed,
+    PortDenied,
+    PortMissing,
+    WrongDevice,
+)
+from lemtomap.drivers.hokuyo.driver import HokuyoDriver
+from lemtomap.drivers.hokuyo.events import LaserScan, SensorInfo
+from lemtomap.drivers.kobuki.driver import KobukiDriver
+from lemtomap.drivers.kobuki.events import BaseInfo, KobukiSample
+from lemtomap.drivers.port import open_serial
 
 STOP = bytes.fromhex("aa550601040000000003")
 DRIVE = bytes.fromhex("aa550601046400000067")
@@ -254,9 +261,9 @@ def test_driver_that_need_not_insist_waits_for_its_port():
 
 PROGRAM = """
 import asyncio, time
-from drivers.driver import cancelled_by_signals
-from drivers.kobuki.driver import KobukiDriver
-from drivers.port import open_serial
+from lemtomap.drivers.driver import cancelled_by_signals
+from lemtomap.drivers.kobuki.driver import KobukiDriver
+from lemtomap.drivers.port import open_serial
 
 async def main(ending):
     def take(event):

@@ -6,11 +6,16 @@ from device_side import scip_fields, scip_scan, scip_status
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.hokuyo import commands
-from drivers.hokuyo.codec import Decoder
-from drivers.hokuyo.commands import ScanRequest
-from drivers.hokuyo.numbers import BadDigitError, decode_number, encode_number, line_sum
-from drivers.hokuyo.packets import (
+from lemtomap.drivers.hokuyo import commands
+from lemtomap.drivers.hokuyo.codec import Decoder
+from lemtomap.drivers.hokuyo.commands import ScanRequest
+from lemtomap.drivers.hokuyo.numbers import (
+    BadDigitError,
+    decode_number,
+    encode_number,
+    line_sum,
+)
+from lemtomap.drivers.hokuyo.packets import (
     BadReply,
     ClockReading,
     Info,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from device_side import II, PP, Urg, kobuki_feedback, scip_fields, scip_status
 
-from drivers.hokuyo.events import (
+from lemtomap.drivers.hokuyo.events import (
     LaserDown,
     LaserFault,
     LaserScan,
@@ -14,9 +14,9 @@ from drivers.hokuyo.events import (
     WrongDeviceSeen,
     is_healthy,
 )
-from drivers.hokuyo.scans import View
-from drivers.hokuyo.session import HokuyoConfig, HokuyoSession
-from drivers.hokuyo.steps import Step
+from lemtomap.drivers.hokuyo.scans import View
+from lemtomap.drivers.hokuyo.session import HokuyoConfig, HokuyoSession
+from lemtomap.drivers.hokuyo.steps import Step
 
 STEP_S = 0.1 / 1024
 

@@ -5,8 +5,8 @@ from device_side import kobuki_feedback, kobuki_frame
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.kobuki.codec import Decoder, encode
-from drivers.kobuki.commands import (
+from lemtomap.drivers.kobuki.codec import Decoder, encode
+from lemtomap.drivers.kobuki.commands import (
     ALL_POWER,
     STOP,
     BaseControl,
@@ -23,8 +23,15 @@ from drivers.kobuki.commands import (
     SoundSequence,
     Tune,
 )
-from drivers.kobuki.packets import FACTORY_GAINS, BadFrame, Feedback, Gains, Udid, Version
-from drivers.kobuki.panel import Panel
+from lemtomap.drivers.kobuki.packets import (
+    FACTORY_GAINS,
+    BadFrame,
+    Feedback,
+    Gains,
+    Udid,
+    Version,
+)
+from lemtomap.drivers.kobuki.panel import Panel
 
 RAW = Path(__file__).parents[3] / "shared" / "data" / "kobuki_raw"
 needs_raw = pytest.mark.skipif(not RAW.is_dir(), reason=f"no recorded bytes in {RAW}")

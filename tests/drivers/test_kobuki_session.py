@@ -4,9 +4,15 @@ import struct
 import pytest
 from device_side import KOBUKI_VERSIONS, Urg, kobuki_feedback
 
-from drivers.kobuki.battery import BatteryConfig, BatteryModel, Level, PowerChange, Source
-from drivers.kobuki.commands import Led, Tune
-from drivers.kobuki.events import (
+from lemtomap.drivers.kobuki.battery import (
+    BatteryConfig,
+    BatteryModel,
+    Level,
+    PowerChange,
+    Source,
+)
+from lemtomap.drivers.kobuki.commands import Led, Tune
+from lemtomap.drivers.kobuki.events import (
     BaseInfo,
     BumperEvent,
     ButtonEvent,
@@ -20,9 +26,14 @@ from drivers.kobuki.events import (
     WheelDropEvent,
     WrongDeviceSeen,
 )
-from drivers.kobuki.identity import judge_firmware
-from drivers.kobuki.packets import BadFrame, Bumper, Gains, Version
-from drivers.kobuki.session import KobukiSession
+from lemtomap.drivers.kobuki.identity import judge_firmware
+from lemtomap.drivers.kobuki.packets import (
+    BadFrame,
+    Bumper,
+    Gains,
+    Version,
+)
+from lemtomap.drivers.kobuki.session import KobukiSession
 
 VERSIONS_PLEASE = bytes.fromhex("AA5504 09 02 0B 00 04")
 

@@ -3,7 +3,12 @@ import math
 import numpy as np
 import pytest
 
-from lemtomap.odometry import NotCovered, OdometryBuffer, OdometryConfig, WheelGyroOdometry
+from lemtomap.odometry import (
+    NotCovered,
+    OdometryBuffer,
+    OdometryConfig,
+    WheelGyroOdometry,
+)
 from lemtomap.types import Odometry
 
 TICK_M = OdometryConfig().metres_per_tick

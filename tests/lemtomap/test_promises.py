@@ -13,12 +13,12 @@ from lemtomap.pipeline import Mapper
 from lemtomap.se2 import between, compose, inverse
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import LevelChanged
+from lemtomap.topo.file.paging import PagedGraph
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
 from lemtomap.topo.learning import learn
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.paging import PagedGraph
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 from tests.lemtomap.grid.rooms import corridor_round, drive, way_round
 from tests.lemtomap.nav.test_navigator import two_rooms

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from robot.bench import run_bench
-from robot.child import python
-from robot.sim_server import FakeHardware
+from lemtomap.robot.child import python
+from lemtomap.robot.cli.bench import run_bench
+from lemtomap.robot.runs.sim_server import FakeHardware
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 MODULES = [
     path for part in ("drivers", "lemtomap", "robot", "sim", "tools") for path in (ROOT / part).rglob("*.py")
 ]
@@ -37,8 +37,14 @@ def trap(tmp_path, monkeypatch):
 
 
 def test_a_module_in_the_working_directory_is_not_imported(trap):
-    subprocess.run(python("-c", "import json, sim"), check=True)  # noqa: S603 - our own text
+    subprocess.run(python("-c", "import json, numpy"), check=True)  # noqa: S603 - our own text
     assert not trap.exists()
+
+
+def test_a_bare_checkout_finds_its_own_modules(tmp_path):
+    command = python("-m", "lemtomap.robot.child")
+    command.insert(1, "-S")  # as if nothing were installed
+    subprocess.run(command, check=True, cwd=tmp_path, env={})  # noqa: S603 - our own module
 
 
 def test_a_bench_is_not_taken_from_the_working_directory(trap, capfd):
@@ -64,4 +70,4 @@ def test_every_process_of_ours_is_started_by_the_one_command_that_looks_nowhere_
         if isinstance(node, ast.List | ast.Tuple)
         and any(ast.unparse(item) == "sys.executable" for item in node.elts)
     ]
-    assert [start.partition(":")[0] for start in starts] == ["robot/child.py"]
+    assert {start.partition(":")[0] for start in starts} == {"robot/child.py"}

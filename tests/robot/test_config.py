@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lemtomap.errors import BadSetting
+from lemtomap.robot import config
 from lemtomap.settings import range_of
-from robot import config
 
 
 def write(tmp_path, text):

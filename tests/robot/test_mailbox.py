@@ -2,7 +2,7 @@
 
 import threading
 
-from robot.mailbox import BoundedQueue, Latest
+from lemtomap.robot.mailbox import BoundedQueue, Latest
 
 
 def test_latest_gives_the_newest_and_wakes_a_waiting_reader():

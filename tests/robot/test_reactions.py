@@ -5,20 +5,26 @@ from itertools import pairwise
 
 import pytest
 
-from drivers.kobuki.commands import Led, Tune
+from lemtomap.drivers.kobuki.commands import Led, Tune
 from lemtomap.nav.types import NavOutput, NavState
+from lemtomap.robot.base import BaseStep
+from lemtomap.robot.config import RobotConfig
+from lemtomap.robot.devices.indicators import (
+    Condition,
+    Indicators,
+    Light,
+    Play,
+    signal_bytes,
+)
+from lemtomap.robot.devices.recording import HOKUYO, KOBUKI
+from lemtomap.robot.devices.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
+from lemtomap.robot.exchange import Exchange
+from lemtomap.robot.motion.safety import Reason
+from lemtomap.sim import worlds
+from lemtomap.sim.base import BaseConfig, BatteryConfig
+from lemtomap.sim.errors import Unplugged
+from lemtomap.sim.simulator import SimConfig, Simulator
 from lemtomap.types import Twist
-from robot.base import BaseStep
-from robot.config import RobotConfig
-from robot.exchange import Exchange
-from robot.feedback import Condition, Indicators, Light, Play, signal_bytes
-from robot.recording import HOKUYO, KOBUKI
-from robot.safety import Reason
-from robot.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
-from sim import worlds
-from sim.base import BaseConfig, BatteryConfig
-from sim.errors import Unplugged
-from sim.simulator import SimConfig, Simulator
 
 
 def ignore(_):

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from sim import worlds
-from sim.movers import Appearing, Person, SwingDoor
-from sim.route import RoutePlanner
-from sim.simulator import Simulator
-from sim.tours import Tour, base_command, drive
-from sim.world import Box
+from lemtomap.sim import worlds
+from lemtomap.sim.movers import Appearing, Person, SwingDoor
+from lemtomap.sim.route import RoutePlanner
+from lemtomap.sim.simulator import Simulator
+from lemtomap.sim.tours import Tour, base_command, drive
+from lemtomap.sim.world import Box
 
 FAR = (50.0, 50.0, 0.0)
 

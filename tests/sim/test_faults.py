@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim import worlds
-from sim.body import BodyState
-from sim.errors import BadWorld
-from sim.faults import Faults, LinkFaults
-from sim.hokuyo import FIRST_STEP, LAST_STEP
-from sim.serve import PtyServer
-from sim.simulator import Simulator
-from sim.tours import base_command
-from sim.urg import ANGLES_RAD
+from lemtomap.sim import worlds
+from lemtomap.sim.body import BodyState
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.faults import Faults, LinkFaults
+from lemtomap.sim.hokuyo import FIRST_STEP, LAST_STEP
+from lemtomap.sim.serve import PtyServer
+from lemtomap.sim.simulator import Simulator
+from lemtomap.sim.tours import base_command
+from lemtomap.sim.urg import ANGLES_RAD
 
 ROOM = 'name = "w"\nspawn = [1.0, 1.0, 0.0]\n[[wall]]\npoints = [[0, 0], [6, 0], [6, 2], [0, 2], [0, 0]]\n'
 

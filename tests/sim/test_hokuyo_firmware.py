@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.hokuyo import HokuyoConfig, HokuyoFirmware
+from lemtomap.sim.hokuyo import HokuyoConfig, HokuyoFirmware
 
 
 def scanner(**settings) -> HokuyoFirmware:

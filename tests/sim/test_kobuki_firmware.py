@@ -2,7 +2,12 @@
 
 import pytest
 
-from sim.kobuki import BaseReadings, KobukiConfig, KobukiFirmware, wheel_speeds_mmps
+from lemtomap.sim.kobuki import (
+    BaseReadings,
+    KobukiConfig,
+    KobukiFirmware,
+    wheel_speeds_mmps,
+)
 
 READINGS = BaseReadings(
     timestamp_ms=1000,

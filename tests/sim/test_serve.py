@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from sim.pty_port import FULL_BYTES, PtyPort
+from lemtomap.sim.pty_port import FULL_BYTES, PtyPort
 
 
 def read_for(fd: int, seconds: float) -> bytes:
@@ -25,7 +25,7 @@ def read_for(fd: int, seconds: float) -> bytes:
 @pytest.mark.realtime
 def test_served_ports_speak_both_protocols_survive_a_close_and_end_cleanly():
     server = subprocess.Popen(
-        [sys.executable, "-m", "sim.serve", "--world", "office"], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-m", "lemtomap.sim.serve", "--world", "office"], stdout=subprocess.PIPE, text=True
     )
     try:
         ports = json.loads(server.stdout.readline())
@@ -74,7 +74,7 @@ def test_unread_port_drops_whole_frames_and_keeps_little_backlog():
 
 def test_unknown_world_is_one_line_and_exit_code_2():
     done = subprocess.run(
-        [sys.executable, "-m", "sim.serve", "--world", "atlantis"],
+        [sys.executable, "-m", "lemtomap.sim.serve", "--world", "atlantis"],
         capture_output=True,
         text=True,
         check=False,

@@ -5,14 +5,14 @@ import struct
 import numpy as np
 import pytest
 
-from sim import worlds
-from sim.body import BodyState
-from sim.errors import BadWorld, Unplugged
-from sim.faults import Faults, LinkFaults
-from sim.raster import clearance_m
-from sim.simulator import Simulator
-from sim.urg import ANGLES_RAD
-from tools.bench_sim import cast_segments, edges, segments_of
+from lemtomap.sim import worlds
+from lemtomap.sim.body import BodyState
+from lemtomap.sim.errors import BadWorld, Unplugged
+from lemtomap.sim.faults import Faults, LinkFaults
+from lemtomap.sim.raster import clearance_m
+from lemtomap.sim.simulator import Simulator
+from lemtomap.sim.urg import ANGLES_RAD
+from tools.bench.sim import cast_segments, edges, segments_of
 
 STREAM = b"MD0044072501000\n"
 

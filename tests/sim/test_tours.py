@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
-from sim import worlds
-from sim.carmen import NO_RETURN_M, record_tour
-from sim.errors import BadWorld
-from sim.route import RoutePlanner
-from sim.simulator import Simulator
-from sim.tours import base_command, drive, plan_errand, plan_tour
-from sim.world import Raster
+from lemtomap.sim import worlds
+from lemtomap.sim.carmen import NO_RETURN_M, record_tour
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.route import RoutePlanner
+from lemtomap.sim.simulator import Simulator
+from lemtomap.sim.tours import (
+    base_command,
+    drive,
+    plan_errand,
+    plan_tour,
+)
+from lemtomap.sim.world import Raster
 
 
 @pytest.fixture(scope="module")

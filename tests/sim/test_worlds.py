@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from sim import worlds
-from sim.errors import BadWorld
-from sim.picture import save_picture
-from sim.raster import clearance_m
+from lemtomap.sim import worlds
+from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.picture import save_picture
+from lemtomap.sim.raster import clearance_m
 
 HOME = """
 name = "home"

@@ -7,8 +7,8 @@ import pytest
 import typer.main
 
 from lemtomap.errors import BadSetting
-from robot.cli import INTERRUPTED, app
-from robot.missions import parse_mission
+from lemtomap.robot.cli.main import INTERRUPTED, app
+from lemtomap.robot.missions.missions import parse_mission
 
 PAGE = (Path(__file__).resolve().parent.parent.parent / "docs" / "commands.md").read_text(encoding="utf-8")
 

@@ -4,9 +4,14 @@ import dataclasses
 import tomllib
 import typing
 
+from lemtomap.robot.config import RobotConfig, from_mapping
 from lemtomap.settings import within
-from robot.config import RobotConfig, from_mapping
-from tools.configuration_page import HEAD, PAGE, notes_of, page
+from tools.configuration_page import (
+    HEAD,
+    PAGE,
+    notes_of,
+    page,
+)
 
 
 def keys(cls, table=()):

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from sim.world import Box
-from tools.bench_explore import _away_m
+from lemtomap.sim.world import Box
+from tools.bench.explore import _away_m
 
 FOOT = Box((1.0, 0.0, 0.04), (0.14, 0.02, 0.025), math.pi / 2)
 TABLE_TOP = Box((1.0, 0.0, 0.73), (0.7, 0.35, 0.015))

@@ -6,7 +6,12 @@ from pathlib import Path
 import pytest
 
 from tools.checks.mutants import Mutant, mutants_of, random_mutants
-from tools.checks.mutate import Sandbox, kernels_on, main, rounds_for
+from tools.checks.mutate import (
+    Sandbox,
+    kernels_on,
+    main,
+    rounds_for,
+)
 from tools.checks.safety_mutants import MUTANTS
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -34,9 +39,9 @@ def checkout(tmp_path):
             "from lemtomap.nav.sign import sign\n\n\n"
             "def test_sign():\n    assert (sign(5), sign(-5)) == (1, 0)\n"
         ),
-        "tests/robot/test_lost.py": "",
-        "tests/robot/test_mission.py": "",
-        "tests/robot/test_lockstep.py": "",
+        "tests/robot/missions/test_lost.py": "",
+        "tests/robot/missions/test_mission.py": "",
+        "tests/robot/runs/test_lockstep.py": "",
         "tests/robot/test_reactions.py": "",
     }.items():
         file = tmp_path / name
@@ -88,7 +93,7 @@ def test_a_folder_without_code_is_refused_in_one_line(checkout, capsys):
 
 
 def test_the_nearest_tests_run_first():
-    rounds = rounds_for("lemtomap/nav/watching.py", ROOT)
+    rounds = rounds_for("lemtomap/nav/route/watching.py", ROOT)
     assert rounds[0] == ["tests/lemtomap/nav/test_watching.py"]
     assert rounds[1:3] == [["tests/lemtomap/nav"], ["tests/lemtomap"]]
     assert rounds_for("lemtomap/topo/loops/judge.py", ROOT)[1] == ["tests/lemtomap/loops"]

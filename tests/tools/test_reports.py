@@ -5,14 +5,15 @@ import json
 import numpy as np
 import pytest
 
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Place
-from lemtomap.topo.store import TopoStore
-from tools import bench_compare, bench_scale
-from tools.soak import judging
-from tools.thesis.bare import bare_bytes
-from tools.thesis.page import to_html
-from tools.thesis.pieces import Piece, Pieces
-from tools.thesis.readings import curve_of
+from tools.bench import compare as bench_compare
+from tools.bench import scale as bench_scale
+from tools.bench.soak_parts import judging
+from tools.bench.thesis_parts.bare import bare_bytes
+from tools.bench.thesis_parts.page import to_html
+from tools.bench.thesis_parts.pieces import Piece, Pieces
+from tools.bench.thesis_parts.readings import curve_of
 
 
 def test_paired_ratio_sees_through_a_machine_whose_speed_wanders():

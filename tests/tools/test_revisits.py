@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tools.revisits import CLOSED_WITHIN_M, Revisits
+from tools.truth.revisits import CLOSED_WITHIN_M, Revisits
 
 
 def drive(ages_m, known_from_m=np.inf, begun_m=0.0):

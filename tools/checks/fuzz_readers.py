@@ -20,13 +20,25 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robot.cli import main as lemtomap
-from robot.config import RobotConfig
-from robot.warmup import warm_up
+from lemtomap.robot.cli.main import main as lemtomap
+from lemtomap.robot.config import RobotConfig
+from lemtomap.robot.runs.warmup import warm_up
 from tools.checks import inputs
-from tools.checks.isolation import Limits, Outcome, Task, run_all
+from tools.checks.isolation import (
+    Limits,
+    Outcome,
+    Task,
+    run_all,
+)
 from tools.checks.mcap_damage import MCAP
-from tools.checks.mutations import BYTES, GZIP, TEXT, XZ, YAML, Mutation
+from tools.checks.mutations import (
+    BYTES,
+    GZIP,
+    TEXT,
+    XZ,
+    YAML,
+    Mutation,
+)
 from tools.checks.sqlite_damage import SQLITE
 
 OUT = "out"

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from robot.cli import main
-from robot.recording import HOKUYO, KOBUKI, Recorder
-from robot.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
+from lemtomap.robot.cli.main import main
+from lemtomap.robot.devices.recording import HOKUYO, KOBUKI, Recorder
+from lemtomap.robot.devices.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
 
 HALL_M = (8.0, 4.0)
 SCANS = 24
@@ -145,9 +145,9 @@ def plan_yaml(image: str) -> bytes:
 
 def recording(folder: Path) -> bytes:
     """Return the recording of a simulated robot that turns in the office. Needs the simulator."""
-    from sim import worlds  # noqa: PLC0415 - pybullet may be missing
-    from sim.errors import Unplugged  # noqa: PLC0415
-    from sim.simulator import Simulator  # noqa: PLC0415
+    from lemtomap.sim import worlds  # noqa: PLC0415 - pybullet may be missing
+    from lemtomap.sim.errors import Unplugged  # noqa: PLC0415
+    from lemtomap.sim.simulator import Simulator  # noqa: PLC0415
 
     simulator, recorder = (
         Simulator(worlds.load("office"), seed=2),

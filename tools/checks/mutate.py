@@ -1,7 +1,7 @@
 """Break the code on purpose, one change at a time: the tests should notice.
 
     python -m tools.checks.mutate lemtomap/topo/loops lemtomap/nav --count 10 --seed 3
-    python -m tools.checks.mutate robot/safety.py
+    python -m tools.checks.mutate robot/motion/safety.py
     python -m tools.checks.mutate --safety [--only cliff]
 
 With folders or files: random mutants of comparisons, logic, arithmetic, constants and returned values. With
@@ -23,15 +23,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from robot.child import python
+from lemtomap.robot.child import python
 from tools.checks.mutants import Mutant, random_mutants
 from tools.checks.safety_mutants import MUTANTS as SAFETY_MUTANTS
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 COPIED = ("drivers", "lemtomap", "robot", "sim", "tools", "tests", "pyproject.toml")
-MISSIONS = [f"tests/robot/test_{name}.py" for name in ("lost", "mission", "lockstep", "reactions")]
+MISSIONS = [
+    f"tests/robot/{name}.py"
+    for name in ("missions/test_lost", "missions/test_mission", "runs/test_lockstep", "test_reactions")
+]
 SAFETY_TESTS = [
-    ["tests/robot/test_safety.py", "tests/robot/test_velocity.py", "tests/robot/test_watchdog.py"]
+    [
+        "tests/robot/motion/test_safety.py",
+        "tests/robot/motion/test_velocity.py",
+        "tests/robot/motion/test_watchdog.py",
+    ]
 ]
 LONGEST_S = 600.0  # of one round of tests: a mutant that never ends is noticed as well
 FAILED = 1  # pytest: some tests failed
@@ -49,7 +56,7 @@ class Sandbox:
         for name in COPIED:
             source = root / name
             if source.is_dir():
-                shutil.copytree(source, self.folder / name)
+                shutil.copytree(source, self.folder / name, symlinks=True)
             elif source.exists():
                 shutil.copy2(source, self.folder / name)
         shared = root.parent / "shared"

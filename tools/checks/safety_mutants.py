@@ -6,12 +6,12 @@ A mutant is one change of one line: a comparison flipped, a rule dropped, a limi
 from tools.checks.mutants import Mutant
 
 
-def _m(name: str, old: str, new: str, path: str = "robot/safety.py") -> Mutant:
+def _m(name: str, old: str, new: str, path: str = "robot/motion/safety.py") -> Mutant:
     return Mutant(name, path, old, new)
 
 
-VELOCITY, PROXIMITY = "robot/velocity.py", "robot/proximity.py"
-WATCHDOG, SETTINGS = "robot/watchdog.py", "lemtomap/settings.py"
+VELOCITY, PROXIMITY = "robot/motion/velocity.py", "robot/motion/proximity.py"
+WATCHDOG, SETTINGS = "robot/motion/watchdog.py", "lemtomap/settings.py"
 MUTANTS = (
     _m(
         "permission starts true",

@@ -8,15 +8,20 @@ import numpy as np
 
 from lemtomap import se2
 from lemtomap.nav.config import ExploreConfig, NavConfig
-from lemtomap.nav.costmap import Costmap
 from lemtomap.nav.explore.frontier import find_openings
 from lemtomap.nav.explore.ground import Ground
 from lemtomap.nav.explore.memory import SeenMemory
 from lemtomap.nav.explore.openings import Openings
 from lemtomap.nav.explore.prices import Here, Price, price_openings
-from lemtomap.nav.metric import Reach, reach_from
+from lemtomap.nav.motion.costmap import Costmap
+from lemtomap.nav.motion.metric import Reach, reach_from
 from lemtomap.nav.route.fresh import FreshGraph
-from lemtomap.nav.types import Goal, NavOutput, NavState, Reason
+from lemtomap.nav.types import (
+    Goal,
+    NavOutput,
+    NavState,
+    Reason,
+)
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent
 from lemtomap.topo.graph import OpeningState, Placeholder

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.nav.explore import kernels
 from lemtomap.nav.explore.ground import Ground
-from lemtomap.nav.metric import Reach
+from lemtomap.nav.kernels import explore as kernels
+from lemtomap.nav.motion.metric import Reach
 
 JOIN_CELLS = 2
 """Frontier cells this near to each other belong to one opening."""

@@ -7,8 +7,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lemtomap.nav.explore import kernels
-from lemtomap.nav.metric import Reach
+from lemtomap.nav.kernels import explore as kernels
+from lemtomap.nav.motion.metric import Reach
 from lemtomap.se2 import Pose
 
 NEAR_CELLS = 5

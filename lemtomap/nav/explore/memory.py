@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from lemtomap.nav.costmap import Costs
-from lemtomap.nav.explore import kernels
 from lemtomap.nav.explore.aside import Aside
+from lemtomap.nav.kernels import explore as kernels
+from lemtomap.nav.motion.costmap import Costs
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import GroundSeen
 from lemtomap.types import RouteGraph

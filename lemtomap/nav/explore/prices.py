@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap import se2
-from lemtomap.nav import kernels
 from lemtomap.nav.config import ExploreConfig
-from lemtomap.nav.metric import Reach, top_cost
+from lemtomap.nav.kernels import fields as kernels
+from lemtomap.nav.motion.metric import Reach, top_cost
 from lemtomap.se2 import Pose
 from lemtomap.topo.graph import Placeholder
 from lemtomap.types import MapView, RouteGraph

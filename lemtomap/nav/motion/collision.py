@@ -6,7 +6,7 @@ import numpy as np
 
 from lemtomap import se2
 from lemtomap.nav.config import BodyLimits
-from lemtomap.nav.motion import kernels
+from lemtomap.nav.kernels import motion as kernels
 from lemtomap.nav.types import Points, Sighting
 from lemtomap.se2 import Pose
 from lemtomap.types import Twist

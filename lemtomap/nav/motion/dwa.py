@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.nav.config import BodyLimits, DwaConfig
-from lemtomap.nav.metric import MetricPlan
-from lemtomap.nav.motion import kernels
+from lemtomap.nav.kernels import motion as kernels
+from lemtomap.nav.motion.metric import MetricPlan
 from lemtomap.se2 import Pose
 from lemtomap.types import Twist
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lemtomap.errors import NoRoute
 from lemtomap.nav.config import RouteConfig
-from lemtomap.nav.route import kernels
+from lemtomap.nav.kernels import route as kernels
 from lemtomap.nav.route.planner import Route
 from lemtomap.types import EdgeTable, RouteEdge
 

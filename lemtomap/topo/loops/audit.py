@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lemtomap.se2 import Pose, adjoint, wrap_angle
+from lemtomap.topo.file.paging import PagedGraph, Reached
 from lemtomap.topo.graph import Covariance, Edge, Leg
 from lemtomap.topo.loops.config import AuditConfig, GateConfig
 from lemtomap.topo.loops.outlook import Expected, LegSource, Outlook
-from lemtomap.topo.paging import PagedGraph, Reached
 from lemtomap.types import EdgeType
 
 

@@ -12,17 +12,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between, compose
+from lemtomap.topo.file.paging import PagedGraph, chain
 from lemtomap.topo.loops.audit import Audit
-from lemtomap.topo.loops.candidates import ranked, search_box, spaced, way_m
+from lemtomap.topo.loops.candidates import (
+    ranked,
+    search_box,
+    spaced,
+    way_m,
+)
 from lemtomap.topo.loops.cases import Task
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis
 from lemtomap.topo.loops.judge import Judge
-from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
+from lemtomap.topo.loops.matcher import (
+    Match,
+    Reference,
+    Search,
+    SearchBox,
+)
 from lemtomap.topo.loops.outlook import Outlook
 from lemtomap.topo.loops.places import PlaceBook
-from lemtomap.topo.paging import PagedGraph, chain
-from lemtomap.topo.recognition import Closed, Closure, Confirmed, Found, Situation
+from lemtomap.topo.recognition import (
+    Closed,
+    Closure,
+    Confirmed,
+    Found,
+    Situation,
+)
 from lemtomap.types import EdgeType
 
 TRIALS_KEPT = 4096

@@ -18,7 +18,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.topo import schema
+from lemtomap.topo.file import schema
 from lemtomap.topo.loops.descriptor import BYTES, unpack
 
 LEAF_ENTRIES = 96

@@ -16,16 +16,27 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, between, compose, inverse, transform
+from lemtomap.se2 import (
+    Pose,
+    between,
+    compose,
+    inverse,
+    transform,
+)
+from lemtomap.topo.file.paging import PagedGraph, chain
 from lemtomap.topo.kernels import fitting
 from lemtomap.topo.loops.config import LocatorConfig, LoopConfig
 from lemtomap.topo.loops.descriptor import describe
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.loops.lineup import LineUp
-from lemtomap.topo.loops.matcher import Match, Reference, Search, SearchBox
+from lemtomap.topo.loops.matcher import (
+    Match,
+    Reference,
+    Search,
+    SearchBox,
+)
 from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
 from lemtomap.topo.loops.places import Company, PlaceBook, kept
-from lemtomap.topo.paging import PagedGraph, chain
 from lemtomap.topo.recognition import Found, Situation
 from lemtomap.types import GridView
 

@@ -11,10 +11,16 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, inverse, pose, transform, wrap_angle
+from lemtomap.se2 import (
+    Pose,
+    inverse,
+    pose,
+    transform,
+    wrap_angle,
+)
 from lemtomap.topo.graph import sure_of
 from lemtomap.topo.kernels import fitting, lines
-from lemtomap.topo.loops import kernels
+from lemtomap.topo.kernels import search as kernels
 from lemtomap.topo.loops.config import MatchConfig
 from lemtomap.types import GridView
 

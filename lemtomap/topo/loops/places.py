@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, transform
 from lemtomap.topo.cells import thinned
+from lemtomap.topo.file.paging import PagedGraph, chain
 from lemtomap.topo.loops.descriptor import BYTES, unpack
-from lemtomap.topo.paging import PagedGraph, chain
 from lemtomap.topo.place import decode_place
 
 T = TypeVar("T")

@@ -5,14 +5,22 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.graph import Edge, Place
 from lemtomap.topo.loops.closer import LoopCloser
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.descriptor import describe
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.loops.locator import Locator, Look
-from lemtomap.topo.paging import PagedGraph
-from lemtomap.topo.recognition import Closed, Decision, Located, News, NotFound, Revoked, Situation
+from lemtomap.topo.recognition import (
+    Closed,
+    Decision,
+    Located,
+    News,
+    NotFound,
+    Revoked,
+    Situation,
+)
 
 
 class LoopRecogniser:

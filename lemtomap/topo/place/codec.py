@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.errors import BadMap
-from lemtomap.topo.place import kernels
-from lemtomap.topo.rows import MOST_PLACE_CELLS, PLACE_FORMAT
+from lemtomap.topo.file.rows import MOST_PLACE_CELLS, PLACE_FORMAT
+from lemtomap.topo.kernels import boundary as kernels
 
 CELL_M = 0.1
 OFFSET_STEP_M = 0.025

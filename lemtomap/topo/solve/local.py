@@ -4,8 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose
-from lemtomap.topo.solve import kernels
-from lemtomap.topo.solve.problem import NormalEquations, Problem, Solution, minimise
+from lemtomap.topo.kernels import solve as kernels
+from lemtomap.topo.solve.problem import (
+    NormalEquations,
+    Problem,
+    Solution,
+    minimise,
+)
 
 
 def solve_local(problem: Problem, start: Pose, fixed: NDArray[np.bool_], iterations: int = 20) -> Solution:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, wrap_angle
 from lemtomap.topo.graph import Edge
-from lemtomap.topo.solve import kernels
+from lemtomap.topo.kernels import solve as kernels
 from lemtomap.types import EdgeType
 
 ROBUST_PHI = 11.3  # 99 % of chi-squared with 3 degrees of freedom: beyond it a closure is doubted

@@ -6,7 +6,12 @@ from scipy.sparse import coo_matrix, csc_matrix, diags_array
 from scipy.sparse.linalg import splu, spsolve
 
 from lemtomap.se2 import Pose
-from lemtomap.topo.solve.problem import NormalEquations, Problem, Solution, minimise
+from lemtomap.topo.solve.problem import (
+    NormalEquations,
+    Problem,
+    Solution,
+    minimise,
+)
 
 
 def solve_whole(problem: Problem, start: Pose, fixed: NDArray[np.bool_], iterations: int = 100) -> Solution:

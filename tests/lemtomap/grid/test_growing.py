@@ -5,8 +5,8 @@ import pytest
 
 from lemtomap import se2
 from lemtomap.grid import GrowingGmapping, SlamConfig
+from lemtomap.grid.beams import ScanPreparer
 from lemtomap.grid.growing import TILE, ArchivedWindow
-from lemtomap.grid.scan import ScanPreparer
 from lemtomap.grid.window import Scratch, look_up
 from lemtomap.types import Odometry
 from tests.lemtomap.grid.rooms import box, drive, scan_at

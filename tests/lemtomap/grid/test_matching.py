@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from lemtomap.grid import SlamConfig
+from lemtomap.grid.beams import ScanPreparer
+from lemtomap.grid.kernels import matching
 from lemtomap.grid.matching import Matcher
-from lemtomap.grid.matching import kernels as matching
 from lemtomap.grid.motion import Uncertainty
-from lemtomap.grid.scan import ScanPreparer
 from lemtomap.grid.window import Scratch, Window, look_up
 from lemtomap.types import Odometry
 from tests.lemtomap.grid import naive

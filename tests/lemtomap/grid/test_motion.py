@@ -5,8 +5,13 @@ import pytest
 
 from lemtomap import se2
 from lemtomap.grid import SlamConfig, WindowMatcher
-from lemtomap.grid.motion import HeadingTrust, Uncertainty, WheelTrust, odometry_drift
-from lemtomap.grid.scan import ScanPreparer
+from lemtomap.grid.beams import ScanPreparer
+from lemtomap.grid.motion import (
+    HeadingTrust,
+    Uncertainty,
+    WheelTrust,
+    odometry_drift,
+)
 from lemtomap.types import Odometry
 from tests.lemtomap.grid import naive
 from tests.lemtomap.grid.rooms import box, drive, scan_at

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lemtomap import se2
-from tools import relations
+from tools.truth import relations
 
 
 def written(tmp_path, name, rows):

@@ -6,7 +6,13 @@ import pytest
 
 from lemtomap import se2
 from lemtomap.errors import BadSetting
-from lemtomap.grid import GrowingGmapping, RollingGmapping, SlamConfig, WindowMatcher, particles
+from lemtomap.grid import (
+    GrowingGmapping,
+    RollingGmapping,
+    SlamConfig,
+    WindowMatcher,
+    particles,
+)
 from lemtomap.grid.foreground import is_foreground
 from lemtomap.types import Odometry, Scan
 from tests.lemtomap.grid.rooms import box, drive, scan_at

@@ -5,8 +5,8 @@ import pytest
 
 from lemtomap import se2
 from lemtomap.grid import SlamConfig
+from lemtomap.grid.beams import Beams, ScanPreparer
 from lemtomap.grid.kernels import searching
-from lemtomap.grid.scan import Beams, ScanPreparer
 from lemtomap.grid.window import Scratch, Window, look_up
 from lemtomap.types import Odometry, Scan
 from tests.lemtomap.grid import naive

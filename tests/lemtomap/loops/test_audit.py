@@ -5,13 +5,13 @@ import pytest
 
 from lemtomap.se2 import pose
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file.paging import PagedGraph
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.loops.audit import Audit
 from lemtomap.topo.loops.config import AuditConfig, GateConfig
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.paging import PagedGraph
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 from tests.lemtomap.topo.drive import lead, room
 

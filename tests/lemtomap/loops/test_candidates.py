@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import compose
-from lemtomap.topo.align import HitMap
 from lemtomap.topo.graph import Edge, Leg
 from lemtomap.topo.loops.candidates import search_box, spaced
 from lemtomap.topo.loops.config import GateConfig
 from lemtomap.topo.loops.outlook import Outlook
+from lemtomap.topo.place.hits import HitMap
 from lemtomap.topo.recognition import Situation
 from lemtomap.types import EdgeType, GridView
 

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import transform
+from lemtomap.topo.file.journal import recorded, undo
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Place
-from lemtomap.topo.journal import recorded, undo
-from lemtomap.topo.loops.descriptor import BYTES, describe, distances, unpack
+from lemtomap.topo.loops.descriptor import (
+    BYTES,
+    describe,
+    distances,
+    unpack,
+)
 from lemtomap.topo.loops.index import LEAF_ENTRIES, PlaceIndex
-from lemtomap.topo.store import TopoStore
 
 
 class Table:

@@ -7,6 +7,7 @@ import pytest
 
 from lemtomap.se2 import between, compose, pose
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.loops import LoopRecogniser
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.mapper import TopoMapper
@@ -20,7 +21,6 @@ from lemtomap.topo.recognition import (
     NotFound,
     Revoked,
 )
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 from tests.lemtomap.topo.drive import lead, room, said
 

@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
-from lemtomap.se2 import between, compose, inverse, transform
+from lemtomap.se2 import (
+    between,
+    compose,
+    inverse,
+    transform,
+)
 from lemtomap.topo.kernels import fitting
-from lemtomap.topo.loops import kernels
+from lemtomap.topo.kernels import search as kernels
 from lemtomap.topo.loops.config import MatchConfig
 from lemtomap.topo.loops.matcher import Reference, Search, SearchBox
 from lemtomap.types import GridView

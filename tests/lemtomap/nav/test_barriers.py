@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lemtomap.nav.barriers import find_barrier
 from lemtomap.nav.config import NavConfig
-from lemtomap.nav.costmap import Costmap
-from lemtomap.nav.metric import reach_from
+from lemtomap.nav.motion.costmap import Costmap
+from lemtomap.nav.motion.metric import reach_from
+from lemtomap.nav.route.barriers import find_barrier
 from tests.lemtomap.nav.test_navigator import two_rooms
 from tests.lemtomap.nav.world import RES
 

@@ -3,8 +3,13 @@
 import numpy as np
 
 from lemtomap import se2
-from lemtomap.nav.amcl.localiser import Amcl
-from lemtomap.nav.amcl.whole_grid import GRID_ID, GridGraph, WholeGridLook, view_of
+from lemtomap.baseline.localiser import Amcl
+from lemtomap.baseline.whole_grid import (
+    GRID_ID,
+    GridGraph,
+    WholeGridLook,
+    view_of,
+)
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal, NavState

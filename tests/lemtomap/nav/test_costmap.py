@@ -3,10 +3,10 @@
 import numpy as np
 
 from lemtomap import se2
-from lemtomap.nav import kernels
 from lemtomap.nav.config import BodyLimits, CostmapConfig
-from lemtomap.nav.costmap import Costmap
+from lemtomap.nav.kernels import fields as kernels
 from lemtomap.nav.motion.collision import limit_twist
+from lemtomap.nav.motion.costmap import Costmap
 from lemtomap.nav.types import Sighting
 from lemtomap.types import GridView, Scan, Twist
 

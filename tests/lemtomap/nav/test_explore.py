@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from lemtomap.nav.config import NavConfig
-from lemtomap.nav.costmap import Costmap
 from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.explore.memory import SeenMemory
+from lemtomap.nav.motion.costmap import Costmap
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import NavOutput, NavState, Reason
 from lemtomap.topo.events import GroundSeen, OpeningDone, OpeningSeen

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from lemtomap import se2
-from lemtomap.nav import kernels
-from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore.aside import FOLLOWED_M, Aside
-from lemtomap.nav.explore.kernels import remember
 from lemtomap.nav.explore.memory import SeenMemory
+from lemtomap.nav.kernels import fields as kernels
+from lemtomap.nav.kernels.explore import remember
+from lemtomap.nav.motion.costmap import Costs
 
 RES, CELLS = 0.05, 200
 NODES = {k: se2.pose(1.0 + k, 5.0, 0.3 * k) for k in range(5)}

@@ -4,7 +4,12 @@ import numpy as np
 
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal, NavState, Reason
-from tests.lemtomap.nav.world import RES, Graph, World, run
+from tests.lemtomap.nav.world import (
+    RES,
+    Graph,
+    World,
+    run,
+)
 
 
 def two_rooms() -> World:

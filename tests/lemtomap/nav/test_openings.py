@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from lemtomap import se2
-from lemtomap.nav import kernels
-from lemtomap.nav.costmap import Costs
 from lemtomap.nav.explore.frontier import Opening, find_openings
 from lemtomap.nav.explore.ground import Ground
 from lemtomap.nav.explore.openings import Openings
-from lemtomap.nav.metric import reach_from
+from lemtomap.nav.kernels import fields as kernels
+from lemtomap.nav.motion.costmap import Costs
+from lemtomap.nav.motion.metric import reach_from
 from lemtomap.topo.events import OpeningDone
 from lemtomap.topo.graph import OpeningState
 

@@ -3,10 +3,10 @@
 import numpy as np
 
 from lemtomap.nav.config import NavConfig
-from lemtomap.nav.metric import MetricPlan
+from lemtomap.nav.motion.metric import MetricPlan
 from lemtomap.nav.outlook import Lookout, Outlook
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.sliding import Target
+from lemtomap.nav.route.sliding import Target
 from lemtomap.types import RouteEdge
 
 

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from lemtomap.nav.config import RecoveryConfig
-from lemtomap.nav.recovery import Ladder, ProgressWatch, Rung, WayBack
+from lemtomap.nav.motion.recovery import (
+    Ladder,
+    ProgressWatch,
+    Rung,
+    WayBack,
+)
 from lemtomap.se2 import IDENTITY, pose
 
 CONFIG = RecoveryConfig()

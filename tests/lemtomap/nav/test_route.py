@@ -10,9 +10,9 @@ from lemtomap.nav.config import RouteConfig
 from lemtomap.nav.route.network import RouteNetwork
 from lemtomap.nav.route.planner import plan_route
 from lemtomap.nav.route.planning import RoutePlanner, table_of
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
-from lemtomap.topo.reader import TopoReader
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 from tests.lemtomap.nav.world import Graph, World
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lemtomap.nav import kernels
 from lemtomap.nav.config import NavConfig
+from lemtomap.nav.kernels import fields as kernels
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import Contact, ContactKind
 from lemtomap.topo.graph import Mark

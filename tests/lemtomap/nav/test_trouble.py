@@ -9,8 +9,13 @@ import pytest
 from lemtomap.nav.config import NavConfig, RecoveryConfig
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.types import Goal, NavState, Reason, Sighting
-from lemtomap.nav.way import Moment, WayKeeper
+from lemtomap.nav.route.way import Moment, WayKeeper
+from lemtomap.nav.types import (
+    Goal,
+    NavState,
+    Reason,
+    Sighting,
+)
 from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed
 from lemtomap.types import RouteEdge, Twist
 from tests.lemtomap.nav.test_navigator import two_rooms

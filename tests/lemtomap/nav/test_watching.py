@@ -2,7 +2,7 @@
 
 import pytest
 
-from lemtomap.nav.watching import EdgeClock
+from lemtomap.nav.route.watching import EdgeClock
 from lemtomap.topo.events import EdgeTraversed
 from tests.lemtomap.nav.world import Graph
 

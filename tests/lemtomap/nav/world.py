@@ -10,7 +10,14 @@ import numpy as np
 
 from lemtomap import se2
 from lemtomap.nav.types import Contact, ContactKind, Sighting
-from lemtomap.types import EdgeType, GridView, MapView, RouteEdge, Scan, Twist
+from lemtomap.types import (
+    EdgeType,
+    GridView,
+    MapView,
+    RouteEdge,
+    Scan,
+    Twist,
+)
 
 RES = 0.05
 

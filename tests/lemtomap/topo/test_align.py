@@ -1,10 +1,17 @@
 import numpy as np
 import pytest
 
-from lemtomap.se2 import between, compose, inverse, pose, transform
-from lemtomap.topo.align import HitMap, MatchConfig, match_place
+from lemtomap.se2 import (
+    between,
+    compose,
+    inverse,
+    pose,
+    transform,
+)
 from lemtomap.topo.kernels import gathering
 from lemtomap.topo.place import decode_place, encode_place
+from lemtomap.topo.place.align import MatchConfig, match_place
+from lemtomap.topo.place.hits import HitMap
 from lemtomap.types import GridView
 from tests.lemtomap.topo.test_place import office
 

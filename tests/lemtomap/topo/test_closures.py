@@ -3,15 +3,27 @@ import pytest
 
 from lemtomap.se2 import between, compose, pose
 from lemtomap.topo.config import TopoConfig
-from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed, GroundSeen, OpeningDone, OpeningSeen
+from lemtomap.topo.events import (
+    Bumped,
+    EdgeBlocked,
+    EdgeTraversed,
+    GroundSeen,
+    OpeningDone,
+    OpeningSeen,
+)
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import OpeningState, Place
 from lemtomap.topo.local import LocalMap
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.topo.place import decode_place
-from lemtomap.topo.reader import TopoReader
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
-from tests.lemtomap.topo.drive import lead, relative, room, said
+from tests.lemtomap.topo.drive import (
+    lead,
+    relative,
+    room,
+    said,
+)
 
 SURE = np.diag([1e-4, 1e-4, 1e-5])
 CORRIDORS = [(-9, -9), (9, -9), (9, 9), (-9, 9), (-9, -8.2)]

@@ -9,16 +9,18 @@ import yaml
 
 from lemtomap.errors import BadInput
 from lemtomap.se2 import between, wrap_angle
-from lemtomap.topo import edit, export, naming, picture
+from lemtomap.topo import naming
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file import edit
+from lemtomap.topo.file.info import describe_map
+from lemtomap.topo.file.journal import entries
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge, Place
-from lemtomap.topo.info import describe_map
-from lemtomap.topo.journal import entries
-from lemtomap.topo.layout import lay_out, trajectory
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.picture import write_png
-from lemtomap.topo.reader import TopoReader
-from lemtomap.topo.store import TopoStore
+from lemtomap.topo.whole import export, picture
+from lemtomap.topo.whole.layout import lay_out, trajectory
+from lemtomap.topo.whole.picture import write_png
 from lemtomap.types import EdgeType
 from tests.lemtomap.topo.drive import lead, room
 from tests.lemtomap.topo.test_solve import read_g2o

@@ -8,16 +8,21 @@ import numpy as np
 import pytest
 
 from lemtomap.errors import BadMap
-from lemtomap.topo import edit, schema
-from lemtomap.topo.checks import COLUMNS
-from lemtomap.topo.graph import Edge, Mark, Place, Placeholder
-from lemtomap.topo.journal import KEYS
+from lemtomap.topo.file import edit, schema
+from lemtomap.topo.file.checks import COLUMNS
+from lemtomap.topo.file.journal import KEYS
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.topo.file.rows import MEASURE, MOST_PLACE_CELLS
+from lemtomap.topo.file.store import TopoStore
+from lemtomap.topo.graph import (
+    Edge,
+    Mark,
+    Place,
+    Placeholder,
+)
 from lemtomap.topo.loops.descriptor import BYTES, describe
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.place import codec, encode_place
-from lemtomap.topo.reader import TopoReader
-from lemtomap.topo.rows import MEASURE, MOST_PLACE_CELLS
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 
 WALL = np.column_stack([np.linspace(-2.0, 2.0, 60), np.ones(60)])

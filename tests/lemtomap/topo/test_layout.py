@@ -3,7 +3,7 @@ import pytest
 
 from lemtomap.se2 import between, compose
 from lemtomap.topo.graph import Edge
-from lemtomap.topo.layout import lay_out_edges
+from lemtomap.topo.whole.layout import lay_out_edges
 from lemtomap.types import EdgeType
 
 STEP = np.array([1.0, 0.0, 2.0 * np.pi / 200])

@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
-from lemtomap.se2 import between, compose, inverse, pose
+from lemtomap.se2 import (
+    between,
+    compose,
+    inverse,
+    pose,
+)
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.places import PlaceBook
 from lemtomap.topo.loops.recogniser import LoopRecogniser
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 from tests.lemtomap.topo.drive import lead, room, said
 

@@ -3,12 +3,12 @@ import pytest
 
 from lemtomap.se2 import between, compose, pose
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file.paging import PagedGraph
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.local import LocalMap, Standing
 from lemtomap.topo.localisation import NotStarted
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.paging import PagedGraph
-from lemtomap.topo.reader import TopoReader
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 from tests.lemtomap.topo.drive import lead, relative, room
 

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from lemtomap.se2 import between, compose, inverse, pose, transform
-from lemtomap.topo.passes import Passes
-from lemtomap.topo.trail import Look
+from lemtomap.se2 import (
+    between,
+    compose,
+    inverse,
+    pose,
+    transform,
+)
+from lemtomap.topo.whole.overlays import Passes
+from lemtomap.topo.whole.trail import Look
 
 ROOM = np.concatenate(
     [np.column_stack([np.linspace(-6, 6, 241), np.full(241, y)]) for y in (-3.0, 3.0)]

@@ -5,12 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
-from lemtomap.topo import edit
+from lemtomap.topo.file import edit
+from lemtomap.topo.file.paging import PagedGraph
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge, Place, Placeholder
-from lemtomap.topo.paging import PagedGraph
 from lemtomap.topo.place import encode_place
-from lemtomap.topo.pruning import prune
-from lemtomap.topo.store import TopoStore
+from lemtomap.topo.whole.pruning import prune
 from lemtomap.types import EdgeType
 
 SURE = np.diag([1e-4, 1e-4, 1e-5])

@@ -5,10 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lemtomap.se2 import IDENTITY, between, compose, inverse, pose, transform
+from lemtomap.se2 import (
+    IDENTITY,
+    between,
+    compose,
+    inverse,
+    pose,
+    transform,
+)
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import GridView
 from tests.lemtomap.topo.drive import along, said
 

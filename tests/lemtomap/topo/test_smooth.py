@@ -3,10 +3,10 @@
 import numpy as np
 
 from lemtomap.se2 import between, compose
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
-from lemtomap.topo.smooth import smooth
-from lemtomap.topo.store import TopoStore
-from lemtomap.topo.trail import ScanTrail
+from lemtomap.topo.whole.smooth import smooth
+from lemtomap.topo.whole.trail import ScanTrail
 from lemtomap.types import EdgeType, SlamUpdate
 
 STEP = np.array([0.5, 0.0, np.pi / 40])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import between, compose
-from lemtomap.topo.solve import Problem, kernels, solve_local, solve_whole
+from lemtomap.topo.kernels import solve as kernels
+from lemtomap.topo.solve import Problem, solve_local, solve_whole
 
 GRAPHS = Path(__file__).parents[4] / "shared" / "data" / "posegraph"
 

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from lemtomap.errors import BadMap
 from lemtomap.nav.config import RouteConfig
 from lemtomap.nav.route.network import RouteNetwork
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.topo.file.rows import edge_from, edge_row
+from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import FOR_EVER_S, Edge, Place
-from lemtomap.topo.reader import TopoReader
-from lemtomap.topo.rows import edge_from, edge_row
-from lemtomap.topo.store import TopoStore
 from lemtomap.types import EdgeType
 
 A_PLACE = Place(0.0, b"\x02\x32" + bytes(198), bytes(20))  # of the format, 50 cells to each side
@@ -86,7 +86,7 @@ RIVAL = """
 import sys
 from pathlib import Path
 from lemtomap.errors import BadMap
-from robot.map_file import apply_edit, info
+from lemtomap.robot.cli.map_file import apply_edit, info
 path = Path(sys.argv[1])
 print(info(path).splitlines()[0])
 try:
@@ -229,7 +229,7 @@ import resource, sys
 from pathlib import Path
 from lemtomap.errors import BadMap
 from lemtomap.topo.graph import Place
-from lemtomap.topo.store import TopoStore
+from lemtomap.topo.file.store import TopoStore
 store = TopoStore.create(Path(sys.argv[1]), commit_every_s=0.0)
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 try:
@@ -301,7 +301,7 @@ def test_an_undriven_closure_is_no_short_cut_until_someone_has_driven_it(tmp_pat
 WRITER = """
 import sys
 from pathlib import Path
-from lemtomap.topo.store import TopoStore
+from lemtomap.topo.file.store import TopoStore
 store = TopoStore.open(Path(sys.argv[1]))
 for k in range(10**9):
     now = k * 0.01

@@ -1,0 +1,116 @@
+"""From a metric plan to a velocity: turn only when needed, drive, slow down at the end, take the heading."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from lemtomap.nav.config import NavConfig
+from lemtomap.nav.motion.dwa import (
+    HELD_MPS,
+    Ending,
+    approach,
+    choose_twist,
+)
+from lemtomap.nav.motion.metric import MetricPlan
+from lemtomap.se2 import Pose, wrap_angle
+from lemtomap.types import Twist
+
+LOOK_M = 0.40
+"""The way's direction is read this far along it."""
+MOVING_MPS = 0.10
+MOVING_TURN_RAD = 1.9
+"""A robot under way bends round rather than stops, unless the way leads back."""
+HELD_TURN_RAD = 0.15
+"""A robot that no arc lets forward faces its way first."""
+
+
+class Motion(StrEnum):
+    """What the follower is doing."""
+
+    TURN = "turn"
+    DRIVE = "drive"
+    STUCK = "stuck"
+    """Every trajectory collides."""
+    THERE = "there"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One control cycle's command."""
+
+    twist: Twist
+    motion: Motion
+
+
+class Follower:
+    """Holds only whether it is turning in place and whether it has reached the spot."""
+
+    def __init__(self, config: NavConfig) -> None:
+        self._config = config
+        self._turning = False
+        self._reached = False
+
+    def restart(self) -> None:
+        """Begin a new goal; speed carries over."""
+        self._turning = self._reached = False
+
+    def step(self, plan: MetricPlan, T_grid_base: Pose, twist: Twist, end_m: float | None) -> Step:
+        """Return the next command along the plan.
+
+        end_m: way left to the goal in metres, when the plan's target is the goal itself; None while the
+        target is a node to pass, where the robot does not slow down.
+        """
+        config, body = self._config, self._config.body
+        heading_off = way_heading_off(plan, T_grid_base)
+        if self._must_turn(heading_off, twist):
+            return Step(turn_in_place(heading_off, twist, config), Motion.TURN)
+        ending = None if end_m is None else Ending(end_m)
+        choice = choose_twist(plan, T_grid_base, twist, ending, body, config.dwa)
+        held = choice.twist is None or choice.twist.v_mps < HELD_MPS
+        if held and abs(heading_off) > HELD_TURN_RAD and twist.v_mps < HELD_MPS:
+            return Step(turn_in_place(heading_off, twist, config), Motion.TURN)
+        if choice.twist is None:
+            return Step(approach(twist, Twist(0.0, 0.0), body, config.period_s), Motion.STUCK)
+        return Step(approach(twist, choice.twist, body, config.period_s), Motion.DRIVE)
+
+    def at_goal(self, end_m: float, tolerance_m: float) -> bool:
+        """Tell whether the spot is reached; then turning may stray by as much again."""
+        self._reached = end_m <= (2.0 * tolerance_m if self._reached else tolerance_m)
+        return self._reached
+
+    def halt(self, T_grid_base: Pose, twist: Twist, yaw_grid_rad: float | None) -> Step:
+        """At the goal: come to rest, take the heading asked for, say THERE."""
+        config = self._config
+        off = 0.0 if yaw_grid_rad is None else float(wrap_angle(yaw_grid_rad - T_grid_base[2]))
+        if abs(off) > config.yaw_tolerance_rad:
+            return Step(turn_in_place(off, twist, config), Motion.TURN)
+        slower = approach(twist, Twist(0.0, 0.0), config.body, config.period_s)
+        resting = slower.v_mps == 0.0 and slower.w_radps == 0.0
+        return Step(slower, Motion.THERE if resting else Motion.DRIVE)
+
+    def _must_turn(self, heading_off: float, twist: Twist) -> bool:
+        config = self._config
+        start = MOVING_TURN_RAD if abs(twist.v_mps) > MOVING_MPS else config.turn_start_rad
+        limit = config.turn_end_rad if self._turning else start
+        self._turning = abs(heading_off) > limit
+        return self._turning
+
+
+def way_heading_off(plan: MetricPlan, T_grid_base: Pose) -> float:
+    """Return the angle in rad from the heading to the start of the way; 0 when the way is very short."""
+    path = plan.path_grid
+    away = np.hypot(*(path - T_grid_base[:2]).T)
+    beyond = np.flatnonzero(away >= LOOK_M)
+    index = int(beyond[0]) if beyond.size else len(path) - 1
+    if away[index] < 0.08:
+        return 0.0
+    dx, dy = path[index] - T_grid_base[:2]
+    return float(wrap_angle(np.arctan2(dy, dx) - T_grid_base[2]))
+
+
+def turn_in_place(off_rad: float, twist: Twist, config: NavConfig) -> Twist:
+    """Return the next command of a turn on the spot by off_rad that ends at rest."""
+    body = config.body
+    w = min(body.w_max_radps, float(np.sqrt(2.0 * 0.6 * body.turn_acceleration_radps2 * abs(off_rad))))
+    return approach(twist, Twist(0.0, float(np.copysign(w, off_rad))), body, config.period_s)

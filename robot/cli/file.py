@@ -1,0 +1,65 @@
+"""Commands about map files."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lemtomap.robot.cli.help import add
+
+MapFile = Annotated[Path, typer.Argument(metavar="MAP.lemto", help="the map file")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add this module's commands to the program, in the order of the help page."""
+    add(app, info, "lemtomap info office.lemto")
+    add(
+        app,
+        edit,
+        "lemtomap edit office.lemto name 12 kitchen",
+        "lemtomap edit office.lemto block kitchen 14        plan no way along this edge",
+        "lemtomap edit office.lemto open kitchen 14",
+        "lemtomap edit office.lemto delete-edge 3 97        a closure that is wrong",
+        "lemtomap edit office.lemto level 31 -1",
+        "lemtomap edit office.lemto undo",
+        takes_minus=True,
+    )
+    add(
+        app,
+        export,
+        "lemtomap export office.lemto office.geojson        nav2 route server",
+        "lemtomap export office.lemto office.tmap2          topological_navigation",
+        "lemtomap export office.lemto office.g2o            or .graphml, .png",
+    )
+
+
+def info(map_file: MapFile) -> None:
+    """Tell what a map holds."""
+    from lemtomap.robot.cli import map_file as files
+
+    typer.echo(files.info(map_file))
+
+
+def edit(
+    map_file: MapFile,
+    words: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="WHAT...", help="name, unname, delete, delete-edge, block, open, level, undo, history"
+        ),
+    ],
+) -> None:
+    """Correct a map by hand; every edit can be undone."""
+    from lemtomap.robot.cli import map_file as files
+
+    typer.echo(files.apply_edit(map_file, words))
+
+
+def export(
+    map_file: MapFile,
+    target: Annotated[Path, typer.Argument(metavar="FILE", help=".geojson, .tmap2, .g2o, .graphml or .png")],
+) -> None:
+    """Write a map for another program; its suffix says which."""
+    from lemtomap.robot.cli import map_file as files
+
+    typer.echo(files.export_map(map_file, target))
