@@ -13,7 +13,7 @@ import numpy as np
 
 from lemtomap.drivers.hokuyo.events import LaserScan
 from lemtomap.drivers.hokuyo.session import HokuyoEvent
-from lemtomap.drivers.kobuki.battery import Level as BatteryLevel
+from lemtomap.drivers.kobuki.battery import ChargeLevel
 from lemtomap.drivers.kobuki.events import (
     BumperEvent,
     CliffEvent,
@@ -31,7 +31,7 @@ from lemtomap.robot.devices.recording import HOKUYO, KOBUKI
 from lemtomap.robot.exchange import (
     BaseStatus,
     Exchange,
-    Level,
+    NoteLevel,
     TimedScan,
 )
 from lemtomap.robot.motion.docking import Docking
@@ -252,8 +252,8 @@ class BaseStep:
         output, view = self._exchange.nav_output.get(), self._exchange.map_view.get()
         state = output.state if output is not None else NavState.IDLE
         low = self._sample is not None and self._sample.battery.level in {
-            BatteryLevel.LOW,
-            BatteryLevel.CRITICAL,
+            ChargeLevel.LOW,
+            ChargeLevel.CRITICAL,
         }
         return Condition(reason, state, view is not None and view.lost, low)
 
@@ -263,7 +263,7 @@ class BaseStep:
             return
         quiet = {Reason.CLEAR, Reason.LIMIT, Reason.NEAR_OBSTACLE, Reason.VELOCITY_SILENT}
         if reason not in quiet:
-            self._exchange.note(now_s, "safety", f"stopped: {reason}", Level.WARN)
+            self._exchange.note(now_s, "safety", f"stopped: {reason}", NoteLevel.WARN)
         elif self._reason not in quiet:
             self._exchange.note(now_s, "safety", f"no longer: {self._reason}")
         self._reason = reason

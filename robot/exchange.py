@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from lemtomap.nav.types import Contact, NavOutput, Sighting
+from lemtomap.nav.types import Contact, NavOutput, ObstacleSighting
 from lemtomap.robot.devices.mapped_scan import MappedScan
 from lemtomap.robot.mailbox import BoundedQueue, Latest
 from lemtomap.robot.motion.docking import DockingOutput
@@ -28,7 +28,7 @@ class TimedScan:
     scan: Scan
     odometry: Odometry
     """At the stamp of the scan, that is of its first beam."""
-    sighting: Sighting
+    sighting: ObstacleSighting
     """The same scan, de-skewed by odometry, base frame at the stamp."""
     arrival_s: float
     valid_beams: int
@@ -50,7 +50,7 @@ class BaseStatus:
     charging: bool = False
 
 
-class Level(StrEnum):
+class NoteLevel(StrEnum):
     """How much a note matters."""
 
     INFO = "INFO"
@@ -65,7 +65,7 @@ class Note:
     stamp_s: float
     source: str
     text: str
-    level: Level = Level.INFO
+    level: NoteLevel = NoteLevel.INFO
 
 
 class MissionState(StrEnum):
@@ -110,7 +110,9 @@ class Exchange:
     def __init__(self) -> None:
         self.odometry: Latest[Odometry] = Latest()
         self.scans: BoundedQueue[TimedScan] = BoundedQueue("scans for the mapper", SCANS_WAITING)
-        self.sightings: BoundedQueue[Sighting] = BoundedQueue("sightings for navigation", SCANS_WAITING)
+        self.sightings: BoundedQueue[ObstacleSighting] = BoundedQueue(
+            "sightings for navigation", SCANS_WAITING
+        )
         self.contacts: BoundedQueue[Contact] = BoundedQueue("contacts for navigation", EVENTS_WAITING)
         self.nav_events: BoundedQueue[NavEvent] = BoundedQueue("events for the mapper", EVENTS_WAITING)
         self.mapped: Latest[float] = Latest()
@@ -131,7 +133,7 @@ class Exchange:
         self.notes: BoundedQueue[Note] = BoundedQueue("notes for the user", EVENTS_WAITING)
         self.last_scan: Latest[TimedScan] = Latest()
 
-    def note(self, stamp_s: float, source: str, text: str, level: Level = Level.INFO) -> None:
+    def note(self, stamp_s: float, source: str, text: str, level: NoteLevel = NoteLevel.INFO) -> None:
         """Leave a line for the user."""
         self.notes.put(Note(stamp_s, source, text, level))
 

@@ -2,7 +2,7 @@
 
 from lemtomap.pipeline import Mapper
 from lemtomap.robot.devices.mapped_scan import MappedScan
-from lemtomap.robot.exchange import Exchange, Level, TimedScan
+from lemtomap.robot.exchange import Exchange, NoteLevel, TimedScan
 from lemtomap.types import MapView
 
 
@@ -26,7 +26,7 @@ class MappingStep:
         mapped = self.mapper.update(timed.scan, timed.odometry, hits_base, lifted=timed.lifted, events=events)
         self.scans += mapped.used
         if mapped.displaced:
-            self._exchange.note(stamp_s, "mapping", mapped.displaced, Level.WARN)
+            self._exchange.note(stamp_s, "mapping", mapped.displaced, NoteLevel.WARN)
         if self.mapper.topo.level != level:
             self._exchange.note(stamp_s, "mapping", f"on level {self.mapper.topo.level} now")
         if mapped.used or self._published is not None:
@@ -35,7 +35,7 @@ class MappingStep:
     def interrupt(self, stamp_s: float, why: str) -> None:
         """Go on in a new part of the map: nobody knows where the robot drove meanwhile."""
         if self.scans:
-            self._exchange.note(stamp_s, "mapping", why, Level.WARN)
+            self._exchange.note(stamp_s, "mapping", why, NoteLevel.WARN)
             self.mapper.lose()
             self._publish(self.mapper.view())
 
@@ -52,11 +52,11 @@ class MappingStep:
 
     def _tell(self, view: MapView) -> None:
         if view.lost:
-            text, level = "lost: looking for the place", Level.WARN
+            text, level = "lost: looking for the place", NoteLevel.WARN
         elif self.mapper.topo.known_place:
-            text, level = "found again", Level.INFO
+            text, level = "found again", NoteLevel.INFO
         else:
-            text, level = "nothing here looks like the map: mapping on as a new part of it", Level.WARN
+            text, level = "nothing here looks like the map: mapping on as a new part of it", NoteLevel.WARN
         self._exchange.note(view.stamp_s, "mapping", text, level)
 
     def close(self) -> None:

@@ -8,11 +8,11 @@ from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal
 from lemtomap.robot.exchange import (
     Exchange,
-    Level,
     MissionState,
     MissionStatus,
+    NoteLevel,
 )
-from lemtomap.robot.missions.missions import Idle, Mission, Moment
+from lemtomap.robot.missions.missions import Idle, Mission, MissionInput
 from lemtomap.robot.missions.relocalise import Finder
 from lemtomap.topo.events import LevelChanged
 from lemtomap.types import MapView, RouteGraph, Twist
@@ -69,7 +69,7 @@ class NavigationStep:
             self._exchange.nav_events.put(event)
         self._exchange.nav_output.put(output)
         self._follow_mission(
-            Moment(
+            MissionInput(
                 now_s,
                 view,
                 self._graph,
@@ -81,7 +81,7 @@ class NavigationStep:
             )
         )
 
-    def _follow_mission(self, moment: Moment) -> None:
+    def _follow_mission(self, moment: MissionInput) -> None:
         if self._status.state.over:
             return
         now_s = moment.now_s
@@ -97,7 +97,7 @@ class NavigationStep:
         if order.dock is not bool(self._exchange.dock.get()):
             self._exchange.dock.put(order.dock)
         if (order.state, order.text) != (self._status.state, self._status.text):
-            level = Level.WARN if order.state is MissionState.FAILED else Level.INFO
+            level = NoteLevel.WARN if order.state is MissionState.FAILED else NoteLevel.INFO
             self._exchange.note(now_s, "mission", order.text or str(order.state), level)
         self._status = MissionStatus(now_s, order.state, order.text)
         self._exchange.mission.put(self._status)

@@ -14,8 +14,8 @@ from lemtomap.sim.body import (
     BodyState,
 )
 from lemtomap.sim.gyro import Gyro, GyroConfig
-from lemtomap.sim.kobuki import BaseReadings, KobukiConfig, KobukiFirmware
-from lemtomap.sim.scene import Contact, Scene
+from lemtomap.sim.kobuki import BaseReadings, FakeKobukiConfig, KobukiFirmware
+from lemtomap.sim.scene import Scene, Touch
 from lemtomap.sim.world import World
 
 PERIOD_S = 0.020
@@ -29,7 +29,7 @@ CLIFF_SENSOR_HEIGHT_M = 0.03
 
 
 @dataclass(frozen=True, slots=True)
-class BatteryConfig:
+class SimulatedBattery:
     """A 4S1P pack (section 10)."""
 
     full_v: float = 16.5
@@ -45,8 +45,8 @@ class BaseConfig:
 
     body: BodyConfig = field(default_factory=BodyConfig)
     gyro: GyroConfig = field(default_factory=GyroConfig)
-    firmware: KobukiConfig = field(default_factory=KobukiConfig)
-    battery: BatteryConfig = field(default_factory=BatteryConfig)
+    firmware: FakeKobukiConfig = field(default_factory=FakeKobukiConfig)
+    battery: SimulatedBattery = field(default_factory=SimulatedBattery)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +165,7 @@ class Base:
         return min(255, round(4.0 * abs(wheel_mps) / MAX_WHEEL_MPS) + (load if wheel_mps else 0))
 
 
-def _bumper_bits(contacts: list[Contact]) -> int:
+def _bumper_bits(contacts: list[Touch]) -> int:
     bits = 0
     for contact in contacts:
         angle = contact.bearing_rad

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lemtomap.sim.scene import Contact, Scene
+from lemtomap.sim.scene import Scene, Touch
 from lemtomap.sim.world import Pose2
 
 HALF_TRACK_M = 0.115  # wheels at y = +-0.115 m
@@ -104,7 +104,7 @@ class Body:
         self._track_m = 2 * HALF_TRACK_M * (1.0 + config.track_sigma * float(draw[2]))
         self._slip = [0.0, 0.0]
         self.state = BodyState(*spawn)
-        self.contacts: list[Contact] = []
+        self.contacts: list[Touch] = []
         """What the body touches now."""
         self.contact_count = 0
         """How often a touch began."""

@@ -30,7 +30,7 @@ from lemtomap.sim.hokuyo import (
 from lemtomap.sim.simulator import Simulator
 from lemtomap.sim.tours import (
     SMALL_S,
-    Tour,
+    ScriptedTour,
     drive,
     plan_tour,
 )
@@ -80,7 +80,7 @@ class _Moment:
     truth: NDArray[np.float64]
 
 
-def record_tour(simulator: Simulator, tour: Tour, path: Path, limit_s: float | None = None) -> int:
+def record_tour(simulator: Simulator, tour: ScriptedTour, path: Path, limit_s: float | None = None) -> int:
     """Drive a tour, at most so long, and write its log; return the number of scans."""
     simulator.hokuyo.write(b"BM\n")
     odometry = DeadReckoning()

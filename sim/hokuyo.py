@@ -31,7 +31,7 @@ DB_SCANS = 20  # simulated failures 03-05 show after this many scans
 
 
 @dataclass(frozen=True, slots=True)
-class HokuyoConfig:
+class FakeHokuyoConfig:
     """What differs between one sensor and another."""
 
     serial: str = "H1510998"
@@ -48,7 +48,7 @@ class HokuyoConfig:
 class HokuyoFirmware:
     """The state machine of section 13."""
 
-    config: HokuyoConfig = field(default_factory=HokuyoConfig)
+    config: FakeHokuyoConfig = field(default_factory=FakeHokuyoConfig)
     laser_on: bool = False
     sensitive: bool = False
     motor_ratio: int = 0

@@ -18,7 +18,7 @@ FIXED_SIZES = {1: 4, 3: 3, 4: 1, 9: 2, 12: 2, 13: 13, 14: 1}
 
 
 @dataclass(frozen=True, slots=True)
-class KobukiConfig:
+class FakeKobukiConfig:
     """What differs between one firmware and another."""
 
     command_timeout_s: float = 0.6
@@ -62,7 +62,7 @@ class BaseReadings:
 class KobukiFirmware:
     """The state a host can change, and the answers it has asked for."""
 
-    config: KobukiConfig = field(default_factory=KobukiConfig)
+    config: FakeKobukiConfig = field(default_factory=FakeKobukiConfig)
     outputs: int = 0x00F0
     """General purpose output register: LEDs and power."""
     gains: tuple[int, int, int] = FACTORY_GAINS

@@ -48,7 +48,7 @@ class OpticsConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Light:
+class BeamHits:
     """What N beams met."""
 
     range_m: NDArray[np.float64]
@@ -60,7 +60,7 @@ class Light:
     """float64 (N, 2), metres, where each beam ends, world frame."""
 
 
-def measure(light: Light, config: OpticsConfig, rng: np.random.Generator) -> NDArray[np.int64]:
+def measure(light: BeamHits, config: OpticsConfig, rng: np.random.Generator) -> NDArray[np.int64]:
     """Return int64 (N,), mm or error codes."""
     hit = np.isfinite(light.range_m)
     distance = np.where(hit, light.range_m, config.max_m)

@@ -24,7 +24,7 @@ ROOF_REACH_M = 25.0
 FIRST_LIMIT, MOST_COST = 2.0, 2000.0  # the search ends at twice the straight line, then goes on further
 
 
-class RoutePlanner:
+class FloorRoutePlanner:
     """Shortest comfortable ways between points of one world.
 
     in_sight: keep walls within the reach of a short laser, at the price of a longer way.

@@ -67,7 +67,7 @@ class Hits:
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class Touch:
     """Where the robot touches something."""
 
     bearing_rad: float
@@ -196,7 +196,7 @@ class Scene:
             robot, (pose[0], pose[1], middle_m), (0, 0, 0, 1), physicsClientId=self.client
         )
 
-    def contacts(self, pose: Pose2, height_m: float = 0.0, near_m: float = 0.002) -> list[Contact]:
+    def contacts(self, pose: Pose2, height_m: float = 0.0, near_m: float = 0.002) -> list[Touch]:
         """Put the robot at a pose and return what it touches, or nearly touches, within near_m."""
         x, y, _ = pose
         reach = BODY_RADIUS_M + near_m
@@ -208,7 +208,7 @@ class Scene:
         things = sorted({body for body, _ in around or ()} - set(self._robots))
         return [contact for thing in things for contact in self._touch(thing, pose, height_m, near_m)]
 
-    def _touch(self, thing: int, pose: Pose2, height_m: float, near_m: float) -> list[Contact]:
+    def _touch(self, thing: int, pose: Pose2, height_m: float, near_m: float) -> list[Touch]:
         found = []
         for robot, low, high in self._shells:
             self._place(robot, pose, height_m + (low + high) / 2)
@@ -219,7 +219,7 @@ class Scene:
                     continue  # floor, ramp or ceiling
                 bearing = math.atan2(-ny, -nx) - pose[2]
                 found.append(
-                    Contact(
+                    Touch(
                         (bearing + math.pi) % (2 * math.pi) - math.pi,
                         -point[8],
                         (nx / level, ny / level),

@@ -10,7 +10,7 @@ from lemtomap.sim.base import BIT_RATE, Base, BaseConfig
 from lemtomap.sim.body import BodyState
 from lemtomap.sim.depth import DepthCamera, DepthConfig
 from lemtomap.sim.faults import Faults
-from lemtomap.sim.hokuyo import HokuyoConfig, HokuyoFirmware
+from lemtomap.sim.hokuyo import FakeHokuyoConfig, HokuyoFirmware
 from lemtomap.sim.link import HostPort, Link
 from lemtomap.sim.scene import Scene
 from lemtomap.sim.urg import Urg, UrgConfig
@@ -28,7 +28,7 @@ class SimConfig:
     base: BaseConfig = field(default_factory=BaseConfig)
     urg: UrgConfig = field(default_factory=UrgConfig)
     depth: DepthConfig = field(default_factory=DepthConfig)
-    scanner: HokuyoConfig = field(default_factory=HokuyoConfig)
+    scanner: FakeHokuyoConfig = field(default_factory=FakeHokuyoConfig)
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ KEYS: dict[str, tuple[frozenset[str], frozenset[str]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class TomlEntry:
     """One table of the file, with what is needed to say where an error is."""
 
     path: Path

@@ -47,7 +47,7 @@ from lemtomap.sim.faults import Faults, LinkFaults, Window
 from lemtomap.sim.floorplan import FloorPlan
 from lemtomap.sim.movers import Appearing, Person, SwingDoor
 from lemtomap.sim.ros_map import load_ros_map
-from lemtomap.sim.toml_entry import KEYS, Entry
+from lemtomap.sim.toml_entry import KEYS, TomlEntry
 from lemtomap.sim.world import (
     Box,
     Pose2,
@@ -93,7 +93,7 @@ def load_toml(path: Path, *, day: int = 0) -> World:
         raise BadWorld(f"{path}:{top.line('spawn')}: {str(error).removeprefix(f'{path}: ')}") from error
 
 
-def _read(path: Path) -> Entry:
+def _read(path: Path) -> TomlEntry:
     try:
         text = path.read_text(encoding="utf-8")
         document = tomllib.loads(text)
@@ -101,27 +101,27 @@ def _read(path: Path) -> Entry:
         raise BadWorld(f"{path}: no such file") from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise BadWorld(f"{path}: not a readable TOML file ({error})") from error
-    top = Entry(path, text, "", 0, document)
+    top = TomlEntry(path, text, "", 0, document)
     top.check_keys()
     return top
 
 
-def _pose(entry: Entry, key: str) -> Pose2:
+def _pose(entry: TomlEntry, key: str) -> Pose2:
     x, y, yaw = entry.numbers(key, 3)
     return x, y, yaw
 
 
-def _entries(top: Entry, table: str) -> list[Entry]:
+def _entries(top: TomlEntry, table: str) -> list[TomlEntry]:
     tables = top.values.get(table, [])
     if not isinstance(tables, list) or not all(isinstance(item, dict) for item in tables):
         raise top.refuse(f"write [[{table}]], one table each", table)
-    entries = [Entry(top.path, top.text, table, index, item) for index, item in enumerate(tables)]
+    entries = [TomlEntry(top.path, top.text, table, index, item) for index, item in enumerate(tables)]
     for entry in entries:
         entry.check_keys()
     return entries
 
 
-def _wall(plan: FloorPlan, entry: Entry, _day: int) -> None:
+def _wall(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
     surface = Surface(entry.choice("surface", "wall", ["wall", "glass", "dark"]))
     for start, end in pairwise(entry.points("points")):
         if start == end:
@@ -135,14 +135,14 @@ def _wall(plan: FloorPlan, entry: Entry, _day: int) -> None:
         )
 
 
-def _room(plan: FloorPlan, entry: Entry, _day: int) -> None:
+def _room(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
     low, high = entry.point("low"), entry.point("high")
     if not (low[0] < high[0] and low[1] < high[1]):
         raise entry.refuse("'low' must lie left of and below 'high'", "low")
     plan.room(str(entry.values["name"]), low, high, kind=str(entry.values.get("kind", "room")))
 
 
-def _door(plan: FloorPlan, entry: Entry, _day: int) -> None:
+def _door(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
     rooms = entry.values["rooms"]
     if not isinstance(rooms, list) or len(rooms) != 2:
         raise entry.refuse("'rooms' must be the names of two rooms", "rooms")
@@ -162,7 +162,7 @@ def _door(plan: FloorPlan, entry: Entry, _day: int) -> None:
     plan.mover(SwingDoor((x0, y0), yaw, math.dist(*door.ends) - 0.02, period, share))
 
 
-def _furniture(plan: FloorPlan, entry: Entry, day: int) -> None:
+def _furniture(plan: FloorPlan, entry: TomlEntry, day: int) -> None:
     kind = entry.choice("kind", "", list(FURNITURE))
     x, y, yaw = entry.numbers("at", 3)
     moved = entry.values.get("moved", [])
@@ -176,7 +176,7 @@ def _furniture(plan: FloorPlan, entry: Entry, day: int) -> None:
         plan.box(box)
 
 
-def _person(plan: FloorPlan, entry: Entry, _day: int) -> None:
+def _person(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
     plan.mover(
         Person(
             tuple(entry.points("points")),
@@ -186,7 +186,7 @@ def _person(plan: FloorPlan, entry: Entry, _day: int) -> None:
     )
 
 
-def _barrier(plan: FloorPlan, entry: Entry, _day: int) -> None:
+def _barrier(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
     (x0, y0), (x1, y1) = entry.point("from"), entry.point("to")
     begin_s, end_s = entry.numbers("during", 2)
     half = (max(math.hypot(x1 - x0, y1 - y0) / 2, 0.05), 0.05, 0.5)
@@ -194,7 +194,7 @@ def _barrier(plan: FloorPlan, entry: Entry, _day: int) -> None:
     plan.mover(Appearing((box,), begin_s, end_s))
 
 
-_ADD: dict[str, Callable[[FloorPlan, Entry, int], None]] = {
+_ADD: dict[str, Callable[[FloorPlan, TomlEntry, int], None]] = {
     "wall": _wall,
     "room": _room,
     "door": _door,
@@ -204,7 +204,7 @@ _ADD: dict[str, Callable[[FloorPlan, Entry, int], None]] = {
 }
 
 
-def _floors(plan: FloorPlan, ramps: list[Entry], holes: list[Entry]) -> None:
+def _floors(plan: FloorPlan, ramps: list[TomlEntry], holes: list[TomlEntry]) -> None:
     """Lay a floor with holes, and ramps on it; a world without both needs no floor."""
     if not ramps and not holes:
         return
@@ -221,7 +221,7 @@ def _floors(plan: FloorPlan, ramps: list[Entry], holes: list[Entry]) -> None:
         plan.box(_ramp(entry))
 
 
-def _ramp(entry: Entry) -> Box:
+def _ramp(entry: TomlEntry) -> Box:
     (x0, y0), (x1, y1) = entry.point("from"), entry.point("to")
     rise = entry.number_of("rise", 0.1, -5.0, 5.0)
     run = math.hypot(x1 - x0, y1 - y0)
@@ -248,7 +248,7 @@ def _without(area: Area, hole: Area) -> list[Area]:
     return [piece for piece in pieces if piece[0] < piece[2] and piece[1] < piece[3]]
 
 
-def _faults(top: Entry) -> Faults:
+def _faults(top: TomlEntry) -> Faults:
     entry = _table(top, "faults", top.values["faults"])
     return Faults(
         kobuki=_link(_table(top, "faults.kobuki", entry.values.get("kobuki", {}))),
@@ -259,15 +259,15 @@ def _faults(top: Entry) -> Faults:
     )
 
 
-def _table(top: Entry, name: str, values: object) -> Entry:
+def _table(top: TomlEntry, name: str, values: object) -> TomlEntry:
     if not isinstance(values, dict):
         raise top.refuse(f"write [{name}], a table", name.rpartition(".")[2])
-    entry = Entry(top.path, top.text, name, 0, values)
+    entry = TomlEntry(top.path, top.text, name, 0, values)
     entry.check_keys()
     return entry
 
 
-def _link(entry: Entry) -> LinkFaults:
+def _link(entry: TomlEntry) -> LinkFaults:
     windows = entry.values.get("unplugged", [])
     if not isinstance(windows, list):
         raise entry.refuse("'unplugged' must be a list of [from, to] in seconds", "unplugged")
@@ -281,10 +281,10 @@ def _link(entry: Entry) -> LinkFaults:
     )
 
 
-def _window(entry: Entry, key: str) -> Window | None:
+def _window(entry: TomlEntry, key: str) -> Window | None:
     return _pair(entry, key, entry.values[key]) if key in entry.values else None
 
 
-def _pair(entry: Entry, key: str, value: object) -> Window:
+def _pair(entry: TomlEntry, key: str, value: object) -> Window:
     begin_s, end_s = entry.checked(value, key, 2)
     return begin_s, end_s

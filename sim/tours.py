@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.sim.route import RoutePlanner, path_length_m
+from lemtomap.sim.route import FloorRoutePlanner, path_length_m
 from lemtomap.sim.simulator import Simulator
 from lemtomap.sim.world import World
 
@@ -32,7 +32,7 @@ class TourConfig:
     spacing_m: float = SPACING_M
 
 
-class Tour:
+class ScriptedTour:
     """Follows one path: `command(pose)` gives (v, w) until `done`."""
 
     def __init__(self, path: NDArray[np.float64], config: TourConfig | None = None) -> None:
@@ -78,13 +78,15 @@ class Tour:
         return float(self.path[-1, 0]), float(self.path[-1, 1])
 
 
-def plan_tour(world: World, duration_s: float, config: TourConfig | None = None, seed: int = 0) -> Tour:
+def plan_tour(
+    world: World, duration_s: float, config: TourConfig | None = None, seed: int = 0
+) -> ScriptedTour:
     """Return a tour of about duration_s that visits place after place and passes known ones again.
 
     The next place is the nearest one not seen yet; when all are seen, a new round begins in another order.
     """
     config = config or TourConfig()
-    planner = RoutePlanner(world.raster)
+    planner = FloorRoutePlanner(world.raster)
     here = (world.spawn[0], world.spawn[1])
     places = planner.places(here, config.spacing_m)
     rng = np.random.default_rng(seed)
@@ -99,17 +101,17 @@ def plan_tour(world: World, duration_s: float, config: TourConfig | None = None,
             here = goal
         if not left:
             left = [places[index] for index in rng.permutation(len(places))[: max(2, len(places) // 2)]]
-    return Tour(np.concatenate(legs), config)
+    return ScriptedTour(np.concatenate(legs), config)
 
 
-def plan_errand(world: World, distance_m: float, config: TourConfig | None = None) -> Tour:
+def plan_errand(world: World, distance_m: float, config: TourConfig | None = None) -> ScriptedTour:
     """Return a drive to a place about distance_m away and back the same way, twice (the thesis' navigation
     tasks).
 
     Of the places that far away, give or take ABOUT, that to which keeping walls in sight costs least:
     a robot that drives as it was led cannot make good what its leader went round.
     """
-    planner, direct = RoutePlanner(world.raster), RoutePlanner(world.raster, in_sight=False)
+    planner, direct = FloorRoutePlanner(world.raster), FloorRoutePlanner(world.raster, in_sight=False)
     home = (world.spawn[0], world.spawn[1])
     lengths = {
         place: path_length_m(planner.path(home, place)) for place in planner.places(home, SPACING_M * 2)
@@ -120,7 +122,7 @@ def plan_errand(world: World, distance_m: float, config: TourConfig | None = Non
     nearest = min(off_m, key=off_m.__getitem__)
     goal = min(detours, key=lambda place: (round(detours[place], 2), off_m[place]), default=nearest)
     way = planner.path(home, goal)
-    return Tour(np.concatenate([way, way[::-1]] * 2), config)
+    return ScriptedTour(np.concatenate([way, way[::-1]] * 2), config)
 
 
 def base_command(v_mps: float, w_radps: float) -> bytes:
@@ -145,7 +147,7 @@ def _int16(value: float) -> int:
     return max(-32768, min(32767, int(value)))
 
 
-def drive(simulator: Simulator, tour: Tour, limit_s: float | None = None) -> Iterator[float]:
+def drive(simulator: Simulator, tour: ScriptedTour, limit_s: float | None = None) -> Iterator[float]:
     """Drive a tour to its end in lock-step, yielding the time every 20 ms; commands go through the port.
 
     A drive that something holds up for good ends at the limit, by default four times the time it should take.

@@ -19,7 +19,7 @@ from lemtomap.sim.hokuyo_stream import STEPS
 from lemtomap.sim.optics import (
     NOTHING,
     WEAK,
-    Light,
+    BeamHits,
     OpticsConfig,
     measure,
 )
@@ -140,7 +140,7 @@ class Urg:
         if blocked is not None and blocked[0] <= self.started_s < blocked[1]:
             values = self._rng.choice([NOTHING, WEAK, 25, 31], size=BEAMS)
         else:
-            light = Light(self._range_m, self._cos, self._albedo, self._points)
+            light = BeamHits(self._range_m, self._cos, self._albedo, self._points)
             values = measure(light, self._config.optics, self._rng)
         scan[FIRST_STEP : LAST_STEP + 1] = values
         return scan

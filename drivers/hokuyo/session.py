@@ -30,7 +30,7 @@ from lemtomap.drivers.hokuyo.packets import (
     is_trouble,
 )
 from lemtomap.drivers.hokuyo.scans import ScanMaker, View
-from lemtomap.drivers.hokuyo.steps import Step
+from lemtomap.drivers.hokuyo.steps import HandshakeStep
 from lemtomap.drivers.identify import (
     HOKUYO,
     excerpt,
@@ -110,7 +110,7 @@ class HokuyoSession:
         self._last_stamp: int | None = None
 
     @property
-    def step(self) -> Step:
+    def step(self) -> HandshakeStep:
         """Where the conversation is."""
         return self._connection.step
 
@@ -123,11 +123,11 @@ class HokuyoSession:
             if isinstance(reply, BadReply):
                 self.counters.damaged += 1
                 events.append(reply)
-            elif self.step is not Step.STREAM:
+            elif self.step is not HandshakeStep.STREAM:
                 self._connect(reply, now_s, events)
-            if self.step is Step.STREAM and isinstance(reply, ScanFrame):
+            if self.step is HandshakeStep.STREAM and isinstance(reply, ScanFrame):
                 self._take_scan(reply, now_s, events)
-            elif self.step is Step.STREAM and isinstance(reply, Status):
+            elif self.step is HandshakeStep.STREAM and isinstance(reply, Status):
                 self._take_status(reply, now_s, events)
         return events
 
@@ -137,12 +137,12 @@ class HokuyoSession:
         self._listened_until_s = now_s
         if self._stranger or now_s < self._rest_until_s:
             return b""
-        if self.step is Step.STREAM:
+        if self.step is HandshakeStep.STREAM:
             self._silent_s += min(listened_s, 0.1)  # a host that slept did not listen
             if self._silent_s > self._patience_s():
                 self._break_off(now_s, f"no scan for {self._silent_s:.1f} s", self._queue)
         command = self._connection.command(now_s)
-        if self.step is Step.FAILED:
+        if self.step is HandshakeStep.FAILED:
             self._rest(now_s, self._queue)
         return command
 
@@ -158,11 +158,11 @@ class HokuyoSession:
             events.append(self.info)
             if not self.info.healthy:
                 self._report(now_s, f"the laser says of itself: {self.info.state['STAT']}", "", events)
-        if self.step is Step.STREAM:
+        if self.step is HandshakeStep.STREAM:
             self._listen_afresh()
             if connection.sync.count and not self.alive:
                 self.clock.anchor(connection.sync.first_raw, connection.sync.offset_s, now_s)
-        elif self.step is Step.FAILED:
+        elif self.step is HandshakeStep.FAILED:
             self._rest(now_s, events)
 
     def _take_scan(self, frame: ScanFrame, now_s: float, events: list[HokuyoEvent]) -> None:

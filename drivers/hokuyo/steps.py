@@ -12,7 +12,7 @@ from enum import Enum, auto
 from lemtomap.drivers.hokuyo import commands
 
 
-class Step(Enum):
+class HandshakeStep(Enum):
     """Where the conversation is."""
 
     QUIET = auto()
@@ -43,20 +43,22 @@ class Question:
     """What the echo of its answer begins with."""
     timeout_s: float
     tries: int
-    unanswered: Step
+    unanswered: HandshakeStep
     """Where to go when nobody answers."""
 
 
-QUESTIONS: dict[Step, Question] = {
-    Step.QUIET: Question(b"\n" + commands.QUIT, "QT", 0.4, 3, Step.SWITCH),
-    Step.SWITCH: Question(commands.USE_SCIP2, "SCIP2.0", 0.4, 1, Step.FAILED),
-    Step.LEAVE_TIME: Question(commands.time_adjust(2), "TM2", 0.4, 2, Step.RESET),
-    Step.RESET: Question(commands.RESET, "RS", 0.8, 2, Step.VERSION),
-    Step.VERSION: Question(commands.VERSION, "VV", 0.8, 1, Step.PARAMETERS),
-    Step.PARAMETERS: Question(commands.PARAMETERS, "PP", 0.5, 4, Step.FAILED),
-    Step.STATE: Question(commands.STATE, "II", 0.5, 2, Step.ENTER_TIME),
-    Step.ENTER_TIME: Question(commands.time_adjust(0), "TM0", 0.3, 2, Step.END_TIME),
-    Step.READ_TIME: Question(commands.time_adjust(1), "TM1", 0.3, 2, Step.END_TIME),
-    Step.END_TIME: Question(commands.time_adjust(2), "TM2", 0.3, 3, Step.START),
-    Step.START: Question(b"", "M", 0.8, 3, Step.FAILED),  # the command depends on the sensor's parameters
+QUESTIONS: dict[HandshakeStep, Question] = {
+    HandshakeStep.QUIET: Question(b"\n" + commands.QUIT, "QT", 0.4, 3, HandshakeStep.SWITCH),
+    HandshakeStep.SWITCH: Question(commands.USE_SCIP2, "SCIP2.0", 0.4, 1, HandshakeStep.FAILED),
+    HandshakeStep.LEAVE_TIME: Question(commands.time_adjust(2), "TM2", 0.4, 2, HandshakeStep.RESET),
+    HandshakeStep.RESET: Question(commands.RESET, "RS", 0.8, 2, HandshakeStep.VERSION),
+    HandshakeStep.VERSION: Question(commands.VERSION, "VV", 0.8, 1, HandshakeStep.PARAMETERS),
+    HandshakeStep.PARAMETERS: Question(commands.PARAMETERS, "PP", 0.5, 4, HandshakeStep.FAILED),
+    HandshakeStep.STATE: Question(commands.STATE, "II", 0.5, 2, HandshakeStep.ENTER_TIME),
+    HandshakeStep.ENTER_TIME: Question(commands.time_adjust(0), "TM0", 0.3, 2, HandshakeStep.END_TIME),
+    HandshakeStep.READ_TIME: Question(commands.time_adjust(1), "TM1", 0.3, 2, HandshakeStep.END_TIME),
+    HandshakeStep.END_TIME: Question(commands.time_adjust(2), "TM2", 0.3, 3, HandshakeStep.START),
+    HandshakeStep.START: Question(
+        b"", "M", 0.8, 3, HandshakeStep.FAILED
+    ),  # the command depends on the sensor's parameters
 }

@@ -18,7 +18,7 @@ class BatteryConfig:
     charger_hold_s: float = 1.5  # old firmware says "charged" for about 1 s after plugging in (kobuki#137)
 
 
-class Level(StrEnum):
+class ChargeLevel(StrEnum):
     """How much is left."""
 
     FULL = "full"
@@ -27,7 +27,7 @@ class Level(StrEnum):
     CRITICAL = "critical"
 
 
-class Source(StrEnum):
+class PowerSource(StrEnum):
     """Where the charging current comes from."""
 
     NONE = "none"
@@ -52,8 +52,8 @@ class Battery:
 
     voltage_v: float
     percent: float
-    level: Level
-    source: Source
+    level: ChargeLevel
+    source: PowerSource
     charge: Charge
 
     @property
@@ -62,8 +62,8 @@ class Battery:
         return self.charge is Charge.CHARGING
 
 
-_FALLING = {Level.LOW: PowerChange.BATTERY_LOW, Level.CRITICAL: PowerChange.BATTERY_CRITICAL}
-_FROM_FULL_DOWN = list(Level)
+_FALLING = {ChargeLevel.LOW: PowerChange.BATTERY_LOW, ChargeLevel.CRITICAL: PowerChange.BATTERY_CRITICAL}
+_FROM_FULL_DOWN = list(ChargeLevel)
 
 _T = TypeVar("_T")
 
@@ -94,7 +94,7 @@ class BatteryModel:
         self._config = config
         self._full_v = config.full_v
         self._charger: _Held[int] | None = None
-        self._level: _Held[Level] | None = None
+        self._level: _Held[ChargeLevel] | None = None
 
     def update(self, voltage_v: float, charger: int, stamp_s: float) -> tuple[Battery, list[PowerChange]]:
         """Take one packet's voltage and charger byte; return the state and what changed."""
@@ -105,7 +105,7 @@ class BatteryModel:
                 voltage_v, self._config.low_v
             )  # the pack ages: full is where it stops charging
         changes += self._follow_level(self._level_of(voltage_v, charge), stamp_s)
-        level = self._level.value if self._level else Level.HEALTHY
+        level = self._level.value if self._level else ChargeLevel.HEALTHY
         return Battery(voltage_v, self._percent(voltage_v), level, source, charge), changes
 
     def _follow_charger(self, charger: int, stamp_s: float) -> list[PowerChange]:
@@ -122,7 +122,7 @@ class BatteryModel:
             changes.append(PowerChange.CHARGE_COMPLETED)
         return changes
 
-    def _follow_level(self, level: Level, stamp_s: float) -> list[PowerChange]:
+    def _follow_level(self, level: ChargeLevel, stamp_s: float) -> list[PowerChange]:
         if self._level is None:
             self._level = _Held(level, self._config.level_hold_s)
             return [_FALLING[level]] if level in _FALLING else []
@@ -133,12 +133,12 @@ class BatteryModel:
             return []
         return [_FALLING[level]] if level in _FALLING else []
 
-    def _level_of(self, voltage_v: float, charge: Charge) -> Level:
+    def _level_of(self, voltage_v: float, charge: Charge) -> ChargeLevel:
         if charge is Charge.CHARGED:
-            return Level.FULL
+            return ChargeLevel.FULL
         if voltage_v > self._config.low_v:
-            return Level.HEALTHY
-        return Level.LOW if voltage_v > self._config.critical_v else Level.CRITICAL
+            return ChargeLevel.HEALTHY
+        return ChargeLevel.LOW if voltage_v > self._config.critical_v else ChargeLevel.CRITICAL
 
     def _percent(self, voltage_v: float) -> float:
         c = self._config
@@ -146,14 +146,14 @@ class BatteryModel:
 
 
 _PLUGGED = {
-    Source.NONE: PowerChange.UNPLUGGED,
-    Source.ADAPTER: PowerChange.PLUGGED_TO_ADAPTER,
-    Source.DOCK: PowerChange.PLUGGED_TO_DOCK,
+    PowerSource.NONE: PowerChange.UNPLUGGED,
+    PowerSource.ADAPTER: PowerChange.PLUGGED_TO_ADAPTER,
+    PowerSource.DOCK: PowerChange.PLUGGED_TO_DOCK,
 }
 
 
-def _read_charger(charger: int) -> tuple[Charge, Source]:
+def _read_charger(charger: int) -> tuple[Charge, PowerSource]:
     charge = Charge(charger & ~CHARGER_ADAPTER)
     if charge is Charge.DISCHARGING:
-        return charge, Source.NONE
-    return charge, Source.ADAPTER if charger & CHARGER_ADAPTER else Source.DOCK
+        return charge, PowerSource.NONE
+    return charge, PowerSource.ADAPTER if charger & CHARGER_ADAPTER else PowerSource.DOCK

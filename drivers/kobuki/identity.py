@@ -30,7 +30,7 @@ class AskConfig:
     """
 
 
-class Identity:
+class BaseIdentity:
     """What is known of one base."""
 
     def __init__(self, config: AskConfig) -> None:

@@ -30,7 +30,7 @@ from lemtomap.drivers.kobuki.events import (
     PowerEvent,
     WrongDeviceSeen,
 )
-from lemtomap.drivers.kobuki.identity import GAINS_SINCE, AskConfig, Identity
+from lemtomap.drivers.kobuki.identity import GAINS_SINCE, AskConfig, BaseIdentity
 from lemtomap.drivers.kobuki.packets import BadFrame, Feedback, Gains
 from lemtomap.drivers.kobuki.panel import Panel
 from lemtomap.drivers.kobuki.plausibility import FrameGate, PlausibilityConfig
@@ -97,7 +97,7 @@ class KobukiSession:
     def reopened(self) -> None:
         """Start afresh: the port was opened again, maybe with another robot behind it."""
         self.clock.restart()
-        self.identity = Identity(self.config.ask)
+        self.identity = BaseIdentity(self.config.ask)
         self.alive = False
         self._decoder = Decoder()
         self._gate = FrameGate(self.config.plausibility)

@@ -18,10 +18,10 @@ from lemtomap.nav.motion.metric import (
     plan_to,
     reach_from,
 )
-from lemtomap.nav.outlook import Outlook
+from lemtomap.nav.outlook import ReachableArea
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.sliding import Target
-from lemtomap.nav.route.way import Moment
+from lemtomap.nav.route.way import CycleInput
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import Goal
 from lemtomap.se2 import Pose
@@ -85,10 +85,10 @@ class WholeGridLook:
         self,
         goal: Goal,
         route: Route,  # noqa: ARG002 - one node
-        moment: Moment,
+        moment: CycleInput,
         tolerance_m: float,
         bound_for_grid: tuple[float, float] | None,  # noqa: ARG002 - one target
-    ) -> Outlook:
+    ) -> ReachableArea:
         """Return the way to the goal over the whole grid. Raises NoRoute."""
         barred = self._goal == goal and moment.now_s - self._looked_s < 0.9 * self._config.look_period_s
         self._looked_s, self._goal = moment.now_s, goal
@@ -98,12 +98,12 @@ class WholeGridLook:
         if found is None or plan is None:
             raise NoRoute(f"no way over the grid to {goal.p_node[0]:.1f}, {goal.p_node[1]:.1f}")
         target = Target(0, GRID_ID, found[:2], final=True, proven=found[2] == 1)
-        return Outlook(moment.now_s, reach, target, plan, tight=False)
+        return ReachableArea(moment.now_s, reach, target, plan, tight=False)
 
     def _search(self, reach: Reach, T_grid_base: Pose, cell: tuple[int, int]) -> MetricPlan | None:
         return plan_to(reach.costs, T_grid_base, cell)
 
-    def _reach_at(self, moment: Moment, *, anew: bool) -> Reach:
+    def _reach_at(self, moment: CycleInput, *, anew: bool) -> Reach:
         """Return what can be reached, searched again only where the old costs do not serve."""
         old = self._reach
         if old is not None and not anew and _stands(old.costs, moment.T_grid_base):

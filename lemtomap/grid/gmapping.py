@@ -14,7 +14,7 @@ from lemtomap.grid import particles
 from lemtomap.grid.beams import Beams
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.mapper import Tracker, roll_and_integrate
-from lemtomap.grid.matching import Match, refused
+from lemtomap.grid.matching import ScanMatch, refused
 from lemtomap.grid.motion import (
     between,
     compose,
@@ -73,7 +73,7 @@ class RollingGmapping(Tracker):
     def _window(self) -> Window:
         return self._particles[self._best].window
 
-    def _integrate(self, beams: Beams, match: Match | None) -> Pose:
+    def _integrate(self, beams: Beams, match: ScanMatch | None) -> Pose:
         assert self._T_grid_base is not None  # noqa: S101
         if match is None:
             for particle in self._particles:
@@ -91,7 +91,7 @@ class RollingGmapping(Tracker):
             self._own_window(particle)
             roll_and_integrate(particle.window, beams, compose(particle.T_grid_base, self._pending))
 
-    def _move_and_weigh(self, beams: Beams, tracked: Match) -> None:
+    def _move_and_weigh(self, beams: Beams, tracked: ScanMatch) -> None:
         """Draw each pose from its proposal and weigh it by how well the scan fits its window (lines 7-16).
 
         A scan that fits nowhere says nothing: then a particle moves as odometry may have it, and where even
@@ -112,7 +112,7 @@ class RollingGmapping(Tracker):
                 particle.log_weight += self.config.weight_per_quality * gain
             particle.T_grid_base = self._draw(match)
 
-    def _draw(self, match: Match) -> Pose:
+    def _draw(self, match: ScanMatch) -> Pose:
         """Return a pose from the Gaussian around the match, fused with the motion prior."""
         noise = np.linalg.cholesky(match.covariance) @ self._rng.standard_normal(3)
         return np.asarray(match.T_grid_base + self._sample_share * noise)

@@ -16,7 +16,7 @@ from lemtomap.grid.beams import Beams
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.gmapping import RollingGmapping, Visit
 from lemtomap.grid.kernels import window as kernels
-from lemtomap.grid.matching import Match
+from lemtomap.grid.matching import ScanMatch
 from lemtomap.grid.motion import between, compose
 from lemtomap.grid.window import (
     LookUp,
@@ -143,7 +143,7 @@ class GrowingGmapping(RollingGmapping):
             visit = visit.before
         return np.array([compose(poses[-visits], since) for visits, since in self._since]).reshape(-1, 3)
 
-    def _integrate(self, beams: Beams, match: Match | None) -> Pose:
+    def _integrate(self, beams: Beams, match: ScanMatch | None) -> Pose:
         T_grid_base = super()._integrate(beams, match)
         for particle in self._particles:
             particle.past = Visit(particle.T_grid_base, particle.past)

@@ -15,7 +15,7 @@ from lemtomap.grid.beams import Beams, ScanPreparer
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.foreground import without_foreground
 from lemtomap.grid.kernels import matching as matching_kernels
-from lemtomap.grid.matching import Match, Matcher, refused
+from lemtomap.grid.matching import Matcher, ScanMatch, refused
 from lemtomap.grid.motion import (
     HeadingTrust,
     Uncertainty,
@@ -102,7 +102,7 @@ class Tracker(ABC):
         """Return the window that scans are tracked against."""
 
     @abstractmethod
-    def _integrate(self, beams: Beams, match: Match | None) -> Pose:
+    def _integrate(self, beams: Beams, match: ScanMatch | None) -> Pose:
         """Put the scan into the window(s); return the best pose now."""
 
     @abstractmethod
@@ -195,7 +195,7 @@ class Tracker(ABC):
             or abs(stamp_s - self._integrated_s) >= self.config.integrate_period_s
         )
 
-    def _track(self, beams: Beams, predicted: Pose, turn_rad: float) -> Match:
+    def _track(self, beams: Beams, predicted: Pose, turn_rad: float) -> ScanMatch:
         """Match against the best window; look all round where odometry leapt or the scan suddenly fits
         nowhere.
         """
@@ -224,12 +224,14 @@ class Tracker(ABC):
             self._usual_quality += share * (match.quality - self._usual_quality)
         return match
 
-    def _contradicts_wheels(self, match: Match, predicted: Pose) -> bool:
+    def _contradicts_wheels(self, match: ScanMatch, predicted: Pose) -> bool:
         """Tell whether a match takes back, or doubles, a good part of the way the wheels have gone."""
         way_m = math.hypot(self._pending[0], self._pending[1])
         return match.accepted and _off_m(match, predicted) > self.config.doubted_share * way_m > 0.0
 
-    def _hear_wheels(self, beams: Beams, match: Match, predicted: Pose, expected: Uncertainty) -> Match:
+    def _hear_wheels(
+        self, beams: Beams, match: ScanMatch, predicted: Pose, expected: Uncertainty
+    ) -> ScanMatch:
         """Return the match without what stands in front, if it bears the wheels out; else the one given.
 
         A person who walks along is all that contradicts them then. Wheels that are late or slip are
@@ -243,8 +245,8 @@ class Tracker(ABC):
         return steady if steady.accepted and bears_out else match
 
     def _look_round(
-        self, beams: Beams, match: Match, predicted: Pose, wanted: float, *, leapt: bool
-    ) -> Match:
+        self, beams: Beams, match: ScanMatch, predicted: Pose, wanted: float, *, leapt: bool
+    ) -> ScanMatch:
         """Return a clearly better match than one that fits badly, of at least the wanted quality: the wheels
         slipped, or odometry leapt and the robot stayed.
         """
@@ -292,7 +294,7 @@ class Tracker(ABC):
         )
 
 
-def _off_m(match: Match, predicted: Pose) -> float:
+def _off_m(match: ScanMatch, predicted: Pose) -> float:
     """Return how far from its prediction a match lies."""
     off_x, off_y, _ = (match.T_grid_base - predicted).tolist()
     return math.hypot(off_x, off_y)
@@ -312,7 +314,7 @@ class WindowMatcher(Tracker):
     def _window(self) -> Window:
         return self._only
 
-    def _integrate(self, beams: Beams, match: Match | None) -> Pose:
+    def _integrate(self, beams: Beams, match: ScanMatch | None) -> Pose:
         del match
         assert self._T_grid_base is not None  # noqa: S101
         roll_and_integrate(self._only, beams, self._T_grid_base)

@@ -38,7 +38,7 @@ class Rules(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Match:
+class ScanMatch:
     """One scan against one window, the odometry prior included."""
 
     T_grid_base: Pose
@@ -81,7 +81,7 @@ class Matcher:
         uncertainty: Uncertainty,
         window: Window,
         reach_rad: float = 0.0,
-    ) -> Match:
+    ) -> ScanMatch:
         """Return the pose that scan and prior agree on; reach_rad > 0 asks for headings that far round to
         be tried.
         """
@@ -103,10 +103,10 @@ class Matcher:
         )
         quality, diversity = out[21:].tolist()
         information, covariance = out[3:12].reshape(3, 3), out[12:21].reshape(3, 3)
-        return Match(out[:3], information, covariance, quality, diversity, quality >= self._min_quality)
+        return ScanMatch(out[:3], information, covariance, quality, diversity, quality >= self._min_quality)
 
 
-def refused(prior: Pose, uncertainty: Uncertainty) -> Match:
+def refused(prior: Pose, uncertainty: Uncertainty) -> ScanMatch:
     """Return what is known when there is nothing to match: odometry alone."""
     covariance = np.diag([uncertainty.sigma_m**2, uncertainty.sigma_m**2, uncertainty.sigma_rad**2])
-    return Match(prior, np.zeros((3, 3)), covariance, 0.0, 0.0, accepted=False)
+    return ScanMatch(prior, np.zeros((3, 3)), covariance, 0.0, 0.0, accepted=False)

@@ -16,27 +16,27 @@ from lemtomap.errors import NoRoute
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
-from lemtomap.nav.motion.follower import Follower, Motion, Step
+from lemtomap.nav.motion.follower import Follower, FollowerState, Step
 from lemtomap.nav.motion.metric import MetricPlan, reach_from
 from lemtomap.nav.motion.recovery import (
-    Ladder,
+    BreadcrumbTrail,
     ProgressWatch,
-    Rung,
-    WayBack,
+    RecoveryBehaviour,
+    RecoverySequence,
 )
 from lemtomap.nav.outlook import FarLook, Lookout, WindowLook
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.sliding import Target, is_roundabout, place_of
 from lemtomap.nav.route.watching import EdgeClock
-from lemtomap.nav.route.way import Moment, WayKeeper
+from lemtomap.nav.route.way import CycleInput, RouteKeeper
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import (
     Contact,
     Goal,
     NavOutput,
+    NavReason,
     NavState,
-    Reason,
-    Sighting,
+    ObstacleSighting,
 )
 from lemtomap.se2 import Pose
 from lemtomap.types import MapView, RouteGraph, Twist
@@ -58,8 +58,8 @@ class Navigator:
         self.surroundings = Surroundings(self.config)
         self.lookout = Lookout(self.surroundings, far(self.surroundings), self.config)
         self._goal: Goal | None = None
-        self._end: tuple[NavState, Reason, str] = (NavState.IDLE, Reason.NONE, "no goal")
-        self._way = WayKeeper(self.config)
+        self._end: tuple[NavState, NavReason, str] = (NavState.IDLE, NavReason.NONE, "no goal")
+        self._way = RouteKeeper(self.config)
         self._lost_s: float | None = None
         self._waiting_s: float | None = None
         self._shut_since_s: float | None = None
@@ -67,8 +67,8 @@ class Navigator:
         self._cycle = 0
         self._follower = Follower(self.config)
         self._progress = ProgressWatch(self.config.recovery)
-        self._ladder = Ladder(self.config.recovery)
-        self._way_back = WayBack()
+        self._ladder = RecoverySequence(self.config.recovery)
+        self._way_back = BreadcrumbTrail()
         self._edge_clock = EdgeClock()
 
     @property
@@ -99,7 +99,7 @@ class Navigator:
     def cancel(self) -> None:
         """Drop the goal; the robot comes to rest within its limits."""
         if self._goal is not None:
-            self._finish(NavState.IDLE, Reason.CANCELLED, "goal cancelled")
+            self._finish(NavState.IDLE, NavReason.CANCELLED, "goal cancelled")
 
     def step(
         self,
@@ -107,7 +107,7 @@ class Navigator:
         graph: RouteGraph,
         T_odom_base: Pose,
         twist: Twist,
-        scan_points_base: Sighting | Sequence[Sighting] | NDArray[np.floating] | None,
+        scan_points_base: ObstacleSighting | Sequence[ObstacleSighting] | NDArray[np.floating] | None,
         bumps: Sequence[Contact],
         now_s: float,
     ) -> NavOutput:
@@ -120,7 +120,7 @@ class Navigator:
         self._cycle += 1
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
         speed = REST if bumps else self._speed(twist)  # a bump has stopped the robot, or must
-        moment = Moment(map_view, graph, T_odom_base, T_grid_base, speed, now_s)
+        moment = CycleInput(map_view, graph, T_odom_base, T_grid_base, speed, now_s)
         self._way_back.drove(T_odom_base)
         self.surroundings.recall(graph, now_s)
         self.surroundings.take(map_view, _as_sightings(scan_points_base, T_odom_base, now_s))
@@ -143,7 +143,7 @@ class Navigator:
             self._command.w_radps if steady else measured.w_radps,
         )
 
-    def _feel(self, bumps: Sequence[Contact], moment: Moment) -> None:
+    def _feel(self, bumps: Sequence[Contact], moment: CycleInput) -> None:
         """Remember contacts and leave them backwards."""
         for contact in bumps:
             moment.events.append(self.surroundings.touch(contact, moment.map_view, moment.T_grid_base))
@@ -153,7 +153,7 @@ class Navigator:
 
     # ---- one cycle with a goal ----
 
-    def _act(self, moment: Moment) -> NavOutput:
+    def _act(self, moment: CycleInput) -> NavOutput:
         if moment.map_view.lost:
             return self._wait_for_pose(moment)
         self._lost_s = None
@@ -168,23 +168,25 @@ class Navigator:
         if self._way.route is None:  # an edge was closed: look for another way at once
             return self._act(moment)
         if self._goal_is_shut(route, moment):
-            return self._fail(moment, Reason.BLOCKED, f"the goal is out of reach from node {route.nodes[-1]}")
+            return self._fail(
+                moment, NavReason.BLOCKED, f"the goal is out of reach from node {route.nodes[-1]}"
+            )
         recovering = self._recover_step(moment)
         return self._go(route, moment) if recovering is None else recovering
 
-    def _go(self, route: Route, moment: Moment) -> NavOutput:
+    def _go(self, route: Route, moment: CycleInput) -> NavOutput:
         plan, target = self.lookout.plan, self.lookout.target
         if plan is None or target is None:
             return self._no_way(route, moment)
         if target.final and self._shut_since_s is not None:
             slower = approach(moment.twist, REST, self.config.body, self.config.period_s)
             return self._output(
-                moment, slower, NavState.WAITING, Reason.OBSTACLE, "no way to the goal in sight"
+                moment, slower, NavState.WAITING, NavReason.OBSTACLE, "no way to the goal in sight"
             )
         self._waiting_s = None
         return self._drive(route, plan, target, moment)
 
-    def _look(self, goal: Goal, route: Route, moment: Moment) -> None:
+    def _look(self, goal: Goal, route: Route, moment: CycleInput) -> None:
         """Renew what is known of the way; start over where a far look shows it closed. Raises NoRoute."""
         if not self.lookout.is_due(moment.now_s) and self.lookout.outlook is not None:
             return
@@ -205,7 +207,7 @@ class Navigator:
         self._waiting_s = None
         self._progress.restart(now_s)
 
-    def _no_route(self, goal: Goal, moment: Moment, text: str) -> NavOutput:
+    def _no_route(self, goal: Goal, moment: CycleInput, text: str) -> NavOutput:
         """Refuse, unless what bars the way came just now and may go again, or is seen to be gone."""
         barred_s, patience_s = self._way.barred_s, self.config.recovery.barred_patience_s
         if self.lookout.is_due(moment.now_s):
@@ -214,12 +216,12 @@ class Navigator:
             if self._way.reopen(reach, moment) or self._way.begin_elsewhere(goal, reach, moment):
                 barred_s = moment.now_s
         if (barred_s is None or moment.now_s - barred_s > patience_s) and not self._way.retry(moment):
-            return self._fail(moment, Reason.NO_ROUTE, text)
+            return self._fail(moment, NavReason.NO_ROUTE, text)
         self._start_over(moment.now_s)
         twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
-        return self._output(moment, twist, NavState.WAITING, Reason.OBSTACLE, f"{text}: waiting")
+        return self._output(moment, twist, NavState.WAITING, NavReason.OBSTACLE, f"{text}: waiting")
 
-    def _goal_is_shut(self, route: Route, moment: Moment) -> bool:
+    def _goal_is_shut(self, route: Route, moment: CycleInput) -> bool:
         """Tell whether the robot has been at the goal's node for a while with no way to the goal itself."""
         if not self._is_beside_goal(route, moment):
             self._shut_since_s = None
@@ -228,7 +230,7 @@ class Navigator:
         since_s = self._shut_since_s
         return since_s is not None and moment.now_s - since_s > self.config.recovery.closed_after_s
 
-    def _is_beside_goal(self, route: Route, moment: Moment) -> bool:
+    def _is_beside_goal(self, route: Route, moment: CycleInput) -> bool:
         """Tell whether the robot is at the goal's node and the goal, though near, is not to be reached.
 
         A long way round over unseen floor to a place beside the node is none: it leads through gaps in walls.
@@ -246,13 +248,13 @@ class Navigator:
 
     # ---- driving ----
 
-    def _drive(self, route: Route, plan: MetricPlan, target: Target, moment: Moment) -> NavOutput:
+    def _drive(self, route: Route, plan: MetricPlan, target: Target, moment: CycleInput) -> NavOutput:
         last = target.final or (target.node_id == route.nodes[-1] and target.beyond_m == 0.0)
         end_m = self._way_to_end(plan, moment.T_grid_base) if last else None
         if end_m is not None and target.final and self._follower.at_goal(end_m, self._tolerance_m()):
             step = self._follower.halt(moment.T_grid_base, moment.twist, self._goal_yaw(route, moment))
-            if step.motion == Motion.THERE:
-                self._finish(NavState.ARRIVED, Reason.NONE, f"arrived at node {route.nodes[-1]}")
+            if step.motion == FollowerState.THERE:
+                self._finish(NavState.ARRIVED, NavReason.NONE, f"arrived at node {route.nodes[-1]}")
                 return self._output(moment, REST, *self._end)
         else:
             step = self._follower.step(plan, moment.T_grid_base, moment.twist, end_m)
@@ -261,12 +263,16 @@ class Navigator:
         self._ladder.relax(self._progress.take_gain())
         return self._send(route, plan, target, step, moment)
 
-    def _send(self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: Moment) -> NavOutput:
+    def _send(
+        self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: CycleInput
+    ) -> NavOutput:
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
         twist = limit_twist(step.twist, points, self.config.body)
-        state = NavState.TURNING if step.motion == Motion.TURN else NavState.DRIVING
+        state = NavState.TURNING if step.motion == FollowerState.TURN else NavState.DRIVING
         reason = (
-            Reason.OBSTACLE if step.motion == Motion.STUCK or twist.v_mps < step.twist.v_mps else Reason.NONE
+            NavReason.OBSTACLE
+            if step.motion == FollowerState.STUCK or twist.v_mps < step.twist.v_mps
+            else NavReason.NONE
         )
         speed_mps = self.config.route.usual_speed_mps
         beyond = self.lookout.edges_beyond(route)
@@ -285,7 +291,7 @@ class Navigator:
         goal = self._goal
         return self.config.goal_tolerance_m if goal is None or goal.tolerance_m is None else goal.tolerance_m
 
-    def _goal_yaw(self, route: Route, moment: Moment) -> float | None:
+    def _goal_yaw(self, route: Route, moment: CycleInput) -> float | None:
         goal = self._goal
         if goal is None or goal.yaw_node_rad is None:
             return None
@@ -294,7 +300,7 @@ class Navigator:
 
     # ---- when it does not work ----
 
-    def _no_way(self, route: Route, moment: Moment) -> NavOutput:
+    def _no_way(self, route: Route, moment: CycleInput) -> NavOutput:
         """Nothing of the route can be reached: wait a little, then climb the ladder."""
         if self._waiting_s is None:
             self._waiting_s = moment.now_s
@@ -302,27 +308,27 @@ class Navigator:
         if moment.now_s - self._waiting_s < patience_s:
             slower = approach(moment.twist, REST, self.config.body, self.config.period_s)
             text = f"no way to node {route.nodes[min(1, len(route.nodes) - 1)]} yet: waiting"
-            return self._output(moment, slower, NavState.WAITING, Reason.OBSTACLE, text)
+            return self._output(moment, slower, NavState.WAITING, NavReason.OBSTACLE, text)
         self._waiting_s = moment.now_s
         return self._climb(moment)
 
-    def _climb(self, moment: Moment) -> NavOutput:
+    def _climb(self, moment: CycleInput) -> NavOutput:
         """Take the next rung of the ladder, or give up with the reason."""
         if self._ladder.exhausted:
-            return self._fail(moment, Reason.BLOCKED, "no progress after every recovery")
+            return self._fail(moment, NavReason.BLOCKED, "no progress after every recovery")
         rung = self._ladder.climb(moment.T_odom_base, moment.now_s)
         self._progress.grace(moment.now_s)
         self.lookout.forget()
-        if rung == Rung.CLEAR:
+        if rung == RecoveryBehaviour.CLEAR:
             self.surroundings.forget_live()
-        if rung == Rung.BLOCK and self._way.close_next(moment):
+        if rung == RecoveryBehaviour.BLOCK and self._way.close_next(moment):
             self._start_over(moment.now_s)
         twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
         return self._output(
-            moment, twist, NavState.RECOVERING, Reason.OBSTACLE, f"no progress: {rung.name.lower()}"
+            moment, twist, NavState.RECOVERING, NavReason.OBSTACLE, f"no progress: {rung.name.lower()}"
         )
 
-    def _recover_step(self, moment: Moment) -> NavOutput | None:
+    def _recover_step(self, moment: CycleInput) -> NavOutput | None:
         wanted = self._ladder.step(
             moment.T_odom_base, self._way_back, moment.now_s, room_behind=self._room_behind(moment)
         )
@@ -335,9 +341,9 @@ class Navigator:
             twist = replace(twist, v_mps=min(twist.v_mps, 0.0))  # no braking distance into what was touched
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
         twist = limit_twist(twist, points, self.config.body)
-        return self._output(moment, twist, NavState.RECOVERING, Reason.OBSTACLE, name)
+        return self._output(moment, twist, NavState.RECOVERING, NavReason.OBSTACLE, name)
 
-    def _room_behind(self, moment: Moment) -> bool:
+    def _room_behind(self, moment: CycleInput) -> bool:
         """Tell whether the costmap leaves room 10 cm behind the robot."""
         costs = self.lookout.costs
         if costs is None:
@@ -350,31 +356,33 @@ class Navigator:
         there, here = costs.clearance[int(row), int(col)], costs.clearance[int(here_row), int(here_col)]
         return bool(there * costs.resolution_m >= self.config.body.radius_m or there > here)
 
-    def _wait_for_pose(self, moment: Moment) -> NavOutput:
+    def _wait_for_pose(self, moment: CycleInput) -> NavOutput:
         if self._lost_s is None:
             self._lost_s = moment.now_s
         if moment.now_s - self._lost_s > self.config.recovery.lost_patience_s:
-            return self._fail(moment, Reason.LOST, "the pose in the map was not found again")
+            return self._fail(moment, NavReason.LOST, "the pose in the map was not found again")
         self._progress.restart(moment.now_s)
         twist = approach(moment.twist, REST, self.config.body, self.config.period_s)
-        return self._output(moment, twist, NavState.WAITING, Reason.LOST, "pose lost: waiting for it")
+        return self._output(moment, twist, NavState.WAITING, NavReason.LOST, "pose lost: waiting for it")
 
-    def _fail(self, moment: Moment, reason: Reason, text: str) -> NavOutput:
+    def _fail(self, moment: CycleInput, reason: NavReason, text: str) -> NavOutput:
         self._finish(NavState.FAILED, reason, text)
         return self._rest(moment)
 
     # ---- results ----
 
-    def _finish(self, state: NavState, reason: Reason, text: str) -> None:
+    def _finish(self, state: NavState, reason: NavReason, text: str) -> None:
         self._end = (state, reason, text)
         self._goal = self._way.route = None
         self.lookout.forget()
 
-    def _rest(self, moment: Moment) -> NavOutput:
+    def _rest(self, moment: CycleInput) -> NavOutput:
         slower = approach(moment.twist, REST, self.config.body, self.config.period_s)
         return self._output(moment, slower, *self._end)
 
-    def _output(self, moment: Moment, twist: Twist, state: NavState, reason: Reason, text: str) -> NavOutput:
+    def _output(
+        self, moment: CycleInput, twist: Twist, state: NavState, reason: NavReason, text: str
+    ) -> NavOutput:
         plan, target, way = self.lookout.plan, self.lookout.target, self._way.route
         return NavOutput(
             stamp_s=moment.now_s,
@@ -391,12 +399,14 @@ class Navigator:
 
 
 def _as_sightings(
-    seen: Sighting | Sequence[Sighting] | NDArray[np.floating] | None, T_odom_base: Pose, now_s: float
-) -> Sequence[Sighting]:
+    seen: ObstacleSighting | Sequence[ObstacleSighting] | NDArray[np.floating] | None,
+    T_odom_base: Pose,
+    now_s: float,
+) -> Sequence[ObstacleSighting]:
     if seen is None:
         return ()
-    if isinstance(seen, Sighting):
+    if isinstance(seen, ObstacleSighting):
         return (seen,)
     if isinstance(seen, np.ndarray):
-        return (Sighting.from_points(now_s, T_odom_base, seen),)
+        return (ObstacleSighting.from_points(now_s, T_odom_base, seen),)
     return seen

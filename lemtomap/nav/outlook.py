@@ -23,7 +23,7 @@ from lemtomap.nav.motion.metric import (
 from lemtomap.nav.route.barriers import find_barrier
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.sliding import Target, choose_target, is_roundabout
-from lemtomap.nav.route.way import Moment
+from lemtomap.nav.route.way import CycleInput
 from lemtomap.nav.surroundings import Surroundings
 from lemtomap.nav.types import CostmapView, Goal
 from lemtomap.types import RouteEdge
@@ -37,7 +37,7 @@ DETOUR_M = 0.8
 
 
 @dataclass(frozen=True, slots=True)
-class Outlook:
+class ReachableArea:
     """What one far look found."""
 
     stamp_s: float
@@ -62,10 +62,10 @@ class FarLook(Protocol):
         self,
         goal: Goal,
         route: Route,
-        moment: Moment,
+        moment: CycleInput,
         tolerance_m: float,
         bound_for_grid: tuple[float, float] | None,
-    ) -> Outlook:
+    ) -> ReachableArea:
         """Return the furthest place of the route that can be reached, and the way to it.
 
         bound_for_grid: the place over unseen floor the robot is on its way to, metres; None: to none.
@@ -83,10 +83,10 @@ class WindowLook:
         self,
         goal: Goal,
         route: Route,
-        moment: Moment,
+        moment: CycleInput,
         tolerance_m: float,
         bound_for_grid: tuple[float, float] | None,
-    ) -> Outlook:
+    ) -> ReachableArea:
         """Look with the body's margin, and without it where that leads further."""
         reach, target = self._reach(goal, route, moment, tolerance_m, bound_for_grid, tight=False)
         beyond, tight = (0 if target is None else target.index), False
@@ -99,13 +99,13 @@ class WindowLook:
             places = moment.map_view.T_grid_node
             target = choose_target(route, goal, places, reach, tolerance_m, goal_seen=True) or target
             plan = plan_to(reach.costs, moment.T_grid_base, target.cell)
-        return Outlook(moment.now_s, reach, target, plan, tight)
+        return ReachableArea(moment.now_s, reach, target, plan, tight)
 
     def _reach(
         self,
         goal: Goal,
         route: Route,
-        moment: Moment,
+        moment: CycleInput,
         tolerance_m: float,
         bound_for_grid: tuple[float, float] | None,
         *,
@@ -122,7 +122,7 @@ class Lookout:
 
     def __init__(self, surroundings: Surroundings, far: FarLook, config: NavConfig) -> None:
         self.far = far
-        self.outlook: Outlook | None = None
+        self.outlook: ReachableArea | None = None
         """What the last far look found; None: look anew."""
         self.plan: MetricPlan | None = None
         """The way to the target as last seen near by."""
@@ -161,8 +161,8 @@ class Lookout:
         return True
 
     def renew(
-        self, goal: Goal, route: Route, moment: Moment, tolerance_m: float, *, far: bool
-    ) -> Outlook | None:
+        self, goal: Goal, route: Route, moment: CycleInput, tolerance_m: float, *, far: bool
+    ) -> ReachableArea | None:
         """Look near by, and far if asked to or due; return what a far look found, None without one."""
         near = None if self.outlook is None else look_near(self._surroundings, self.outlook, moment)
         found = None
@@ -190,13 +190,13 @@ class Lookout:
         return () if at is None else route.edges[at:]
 
 
-def _unproven_place(outlook: Outlook) -> tuple[float, float] | None:
+def _unproven_place(outlook: ReachableArea) -> tuple[float, float] | None:
     """Return where over unseen floor the outlook leads, metres, grid frame; None over seen floor."""
     target, plan = outlook.target, outlook.plan
     return None if target is None or plan is None or target.proven else plan.p_target_grid
 
 
-def look_near(surroundings: Surroundings, outlook: Outlook, moment: Moment) -> MetricPlan | None:
+def look_near(surroundings: Surroundings, outlook: ReachableArea, moment: CycleInput) -> MetricPlan | None:
     """Return the way to the outlook's target as the sensors show it now; None when none is left."""
     if outlook.plan is None:
         return None
@@ -207,7 +207,7 @@ def look_near(surroundings: Surroundings, outlook: Outlook, moment: Moment) -> M
 
 
 def outdated(
-    outlook: Outlook, near: MetricPlan | None, route: Route, moment: Moment, config: NavConfig
+    outlook: ReachableArea, near: MetricPlan | None, route: Route, moment: CycleInput, config: NavConfig
 ) -> bool:
     """Tell whether it is time for another far look."""
     age_s = moment.now_s - outlook.stamp_s

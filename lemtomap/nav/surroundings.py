@@ -14,8 +14,8 @@ from lemtomap.nav.motion.costmap import Costmap, Costs, Felt
 from lemtomap.nav.types import (
     Contact,
     ContactKind,
+    ObstacleSighting,
     Points,
-    Sighting,
 )
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import Bumped
@@ -60,7 +60,7 @@ class Surroundings:
     def __init__(self, config: NavConfig) -> None:
         self._config = config
         self._costmap = Costmap(config.costmap, config.body)
-        self._sightings: dict[str, Sighting] = {}
+        self._sightings: dict[str, ObstacleSighting] = {}
         self._hazards: list[Hazard] = []
         self._recalled = False
 
@@ -78,7 +78,7 @@ class Surroundings:
                 self._keep(Hazard(mark.node_id, (mark.x_m, mark.y_m), kind, now_s, shut_s))
         self._recalled = True
 
-    def take(self, map_view: MapView, sightings: Sequence[Sighting]) -> None:
+    def take(self, map_view: MapView, sightings: Sequence[ObstacleSighting]) -> None:
         """Take the newest window and what the sensors saw since the last call."""
         self._costmap.follow_window(map_view.grid)
         for sighting in sightings:

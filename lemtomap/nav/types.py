@@ -50,7 +50,7 @@ class NavState(StrEnum):
     FAILED = "failed"
 
 
-class Reason(StrEnum):
+class NavReason(StrEnum):
     """Why the navigator waits or gave up."""
 
     NONE = ""
@@ -83,7 +83,7 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
+class ObstacleSighting:
     """What a range sensor saw at one moment: where rays ended, and rays that met nothing."""
 
     stamp_s: float
@@ -102,7 +102,7 @@ class Sighting:
     behind it, so its rays clear nothing on their way, only where they end on the floor."""
 
     @classmethod
-    def from_scan(cls, scan: Scan, T_odom_base: Pose, source: str = "laser") -> "Sighting":
+    def from_scan(cls, scan: Scan, T_odom_base: Pose, source: str = "laser") -> "ObstacleSighting":
         """Read a scan: NaN and out-of-range values say nothing, +inf says free up to the range limit."""
         ranges = np.asarray(scan.ranges_m, dtype=np.float64)
         angles = scan.angle_min_rad + scan.angle_step_rad * np.arange(ranges.size) + scan.T_base_laser[2]
@@ -122,7 +122,7 @@ class Sighting:
     @classmethod
     def from_cloud(
         cls, stamp_s: float, T_odom_base: Pose, cloud_base: NDArray[np.floating], source: str = "depth"
-    ) -> "Sighting":
+    ) -> "ObstacleSighting":
         """Take points (N, 3) of a depth camera, metres, base frame with z above the floor.
 
         What the robot would run into stands between FLOOR_M and its own height; what is lower is floor.
@@ -138,7 +138,7 @@ class Sighting:
     @classmethod
     def from_points(
         cls, stamp_s: float, T_odom_base: Pose, hits_base: NDArray[np.floating], source: str = "laser"
-    ) -> "Sighting":
+    ) -> "ObstacleSighting":
         """Take bare hit points (N, 2) in the base frame; rows that are not finite are dropped."""
         hits = np.asarray(hits_base, dtype=np.float64).reshape(-1, 2)
         hits = hits[np.isfinite(hits).all(axis=1)]
@@ -165,7 +165,7 @@ class NavOutput:
     twist: Twist
     """What the robot should do now; zero unless driving."""
     state: NavState
-    reason: Reason = Reason.NONE
+    reason: NavReason = NavReason.NONE
     text: str = ""
     """One line for a person: what it does, or why it cannot."""
     goal: Goal | None = None

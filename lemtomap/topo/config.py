@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from lemtomap.displacement import WatchConfig
 from lemtomap.errors import BadSetting
 from lemtomap.settings import within
-from lemtomap.topo.place.align import MatchConfig
+from lemtomap.topo.place.align import AlignConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class TopoConfig:
     """Points that are new or gone (0.3 m of surface) make another place, ..."""
     place_stale_visits: int = within(2, 1, 100)
     """... and so many visits in a row that find it so have it taken anew."""
-    match: MatchConfig = field(default_factory=MatchConfig)
+    match: AlignConfig = field(default_factory=AlignConfig)
     watch: WatchConfig = field(default_factory=WatchConfig)
     fresh_m: float = within(10.0, 0.5, 1000.0)
     """Way after which a node's place in the window is measured again."""

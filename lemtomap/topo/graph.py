@@ -108,7 +108,7 @@ class Edge:
         return turn @ self.covariance @ turn.T
 
 
-class Leg(NamedTuple):
+class DirectedEdge(NamedTuple):
     """An edge as seen from one end, in plain numbers: what a look over many thousand edges needs of each."""
 
     edge_id: int
@@ -124,7 +124,7 @@ class Leg(NamedTuple):
     """rad^2."""
 
     @classmethod
-    def along(cls, edge: Edge, node_id: int) -> "Leg":
+    def along(cls, edge: Edge, node_id: int) -> "DirectedEdge":
         """Return an edge as seen from the node."""
         x_m, y_m, yaw_rad = edge.seen_from(node_id).tolist()
         (xx, _, _), (_, yy, _), (_, _, turn_var) = edge.covariance.tolist()

@@ -12,9 +12,9 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.graph import Place
 from lemtomap.topo.kernels import fitting
-from lemtomap.topo.local import LocalMap, Standing
+from lemtomap.topo.local import LocalMap, NodePoseEstimate
 from lemtomap.topo.place import decode_place, encode_place
-from lemtomap.topo.place.align import Match, match_place
+from lemtomap.topo.place.align import PlaceMatch, match_place
 from lemtomap.topo.place.hits import HitMap
 from lemtomap.types import GridView
 
@@ -86,7 +86,7 @@ class PlaceKeeper:
                 taken += self._take(node_id, standing, grid, now_s, anyway=self._due.pop(node_id))
         return taken
 
-    def take_all(self, standings: dict[int, Standing], grid: GridView, now_s: float) -> list[Taken]:
+    def take_all(self, standings: dict[int, NodePoseEstimate], grid: GridView, now_s: float) -> list[Taken]:
         """Take what is due now, ripe or not: the drive ends."""
         taken = []
         for node_id, anyway in self._due.items():
@@ -96,7 +96,7 @@ class PlaceKeeper:
         self._due.clear()
         return taken
 
-    def align(self, node_id: int, standing: Standing, grid: GridView) -> Match | None:
+    def align(self, node_id: int, standing: NodePoseEstimate, grid: GridView) -> PlaceMatch | None:
         """Match a node's data with the window around its predicted pose; None when it has none."""
         place = self._graph.store.place(node_id)
         if place is None:
@@ -108,7 +108,9 @@ class PlaceKeeper:
         predicted = (standing.T_grid_node, standing.covariance)
         return match_place(boundary, hits, grid, predicted, self.config.match)
 
-    def _is_stale(self, node_id: int, standing: Standing, points_node: Points, grid: GridView) -> bool:
+    def _is_stale(
+        self, node_id: int, standing: NodePoseEstimate, points_node: Points, grid: GridView
+    ) -> bool:
         """Compare what surrounds a node now with its data; after several visits that differ, tell so.
 
         One visit with a person or an open door in view changes nothing; one that shows a side never seen
@@ -133,7 +135,7 @@ class PlaceKeeper:
         return stale
 
     def _take(
-        self, node_id: int, standing: Standing, grid: GridView, now_s: float, *, anyway: bool
+        self, node_id: int, standing: NodePoseEstimate, grid: GridView, now_s: float, *, anyway: bool
     ) -> list[Taken]:
         """Write a node's data: of one seen before only when it proves stale."""
         centre = (float(standing.T_grid_node[0]), float(standing.T_grid_node[1]))

@@ -15,7 +15,7 @@ from lemtomap.types import EdgeType, SlamUpdate
 
 
 @dataclass(frozen=True, slots=True)
-class Lift:
+class LevelDeparture:
     """Where the robot left a level; odometry goes on while the window begins anew."""
 
     node_id: int

@@ -25,7 +25,7 @@ SOLVE_ITERATIONS = 20  # far more than a warm start takes
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class NodePoseEstimate:
     """Where a node stands in the window."""
 
     T_grid_node: Pose
@@ -63,7 +63,7 @@ class LocalMap:
     def __init__(self, graph: PagedGraph, config: TopoConfig) -> None:
         self._graph = graph
         self._config = config
-        self.standings: dict[int, Standing] = {}
+        self.standings: dict[int, NodePoseEstimate] = {}
         self.reached: dict[int, Reached] = {}
         self.way_m = 0.0
         """Way of the robot so far."""
@@ -78,7 +78,7 @@ class LocalMap:
         seen: Covariance | None = None,
     ) -> None:
         """Set a node's pose as measured in this window; `seen` is the covariance of the measurement alone."""
-        self.standings[node_id] = Standing(
+        self.standings[node_id] = NodePoseEstimate(
             T_grid_node, covariance, anchored=True, born=born, measured_m=self.way_m, seen=seen
         )
 
@@ -146,7 +146,7 @@ class LocalMap:
         """
         config = self._config
         self.reached = self._graph.reach(associated_id, config.local_radius_m, config.local_limit)
-        settled: dict[int, Standing] = {}
+        settled: dict[int, NodePoseEstimate] = {}
         for node_id, reached in self.reached.items():
             known = self.standings.get(node_id)
             if known is not None and (reached.via is None or (known.anchored and self._is_fresh(known))):
@@ -161,14 +161,14 @@ class LocalMap:
                     reached.via.covariance,
                     int(reached.via.target_id == from_id),
                 )
-                settled[node_id] = Standing(T_grid_node, covariance, anchored=False)
+                settled[node_id] = NodePoseEstimate(T_grid_node, covariance, anchored=False)
         self.standings = self._solved(settled)
 
-    def _is_fresh(self, standing: Standing) -> bool:
+    def _is_fresh(self, standing: NodePoseEstimate) -> bool:
         """Tell whether a node was measured so lately that the window cannot have drifted away from it."""
         return self.way_m - standing.measured_m <= self._config.fresh_m
 
-    def _solved(self, settled: dict[int, Standing]) -> dict[int, Standing]:
+    def _solved(self, settled: dict[int, NodePoseEstimate]) -> dict[int, NodePoseEstimate]:
         """Fit the nodes that are not anchored to all edges among them (thesis, Figure 3-7c).
 
         Composed along the shortest ways they start near the answer; where the edges agree nothing is solved.
@@ -187,11 +187,11 @@ class LocalMap:
         solution = solve_local(problem, poses, ~np.array(free), SOLVE_ITERATIONS)
         solved = compose(grid_poses[0], solution.poses)
         return {
-            node_id: Standing(pose, standing.covariance, anchored=False) if loose else standing
+            node_id: NodePoseEstimate(pose, standing.covariance, anchored=False) if loose else standing
             for (node_id, standing), pose, loose in zip(settled.items(), solved, free, strict=True)
         }
 
-    def _edges_among(self, settled: dict[int, Standing]) -> list[Edge]:
+    def _edges_among(self, settled: dict[int, NodePoseEstimate]) -> list[Edge]:
         return [
             edge
             for node_id in settled

@@ -21,8 +21,8 @@ from lemtomap.topo.graph import (
 )
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
-from lemtomap.topo.levels import Lift, put_on_level
-from lemtomap.topo.local import LocalMap, Standing
+from lemtomap.topo.levels import LevelDeparture, put_on_level
+from lemtomap.topo.local import LocalMap, NodePoseEstimate
 from lemtomap.topo.localisation import Localisation, Now, Transform
 from lemtomap.topo.neighbours import NeighbourFinder, directly_navigable
 from lemtomap.topo.recognition import (
@@ -84,7 +84,7 @@ class TopoMapper:
         self._sure_m = 0.0
         self._neighbours = NeighbourFinder(config)
         self._at = Localisation(config, self.local, self.keeper)
-        self._lift: Lift | None = None
+        self._lift: LevelDeparture | None = None
         self._snapshots = Snapshots(self.graph, self.local)
 
     @property
@@ -314,7 +314,7 @@ class TopoMapper:
 
     # -- closures and parts of the map ----------------------------------------------------------------------
 
-    def standing(self, node_id: int) -> Standing | None:
+    def standing(self, node_id: int) -> NodePoseEstimate | None:
         """Return where a node of the neighbourhood stands in the window, None beyond it."""
         return self.local.standings.get(node_id)
 
@@ -354,11 +354,11 @@ class TopoMapper:
         """
         if level != self.level and self._at.last is not None:
             at = self._at
-            self._lift = Lift.left(at.associated_id, at.T_node_base, at.covariance, at.now.slam)
+            self._lift = LevelDeparture.left(at.associated_id, at.T_node_base, at.covariance, at.now.slam)
             self.lose()
         self.level = level
 
-    def _leave_lift(self, lift: Lift) -> None:
+    def _leave_lift(self, lift: LevelDeparture) -> None:
         node_id, self._lift = self._birth(), None
         self.graph.add_edge(lift.edge_to(node_id, self._at.now.slam, COVARIANCE_FLOOR))
         self.local.settle(node_id)

@@ -11,7 +11,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.file.paging import PagedGraph, Reached
 from lemtomap.topo.graph import Covariance, Edge, chain_covariance
 from lemtomap.topo.kernels import sight
-from lemtomap.topo.local import LocalMap, Standing
+from lemtomap.topo.local import LocalMap, NodePoseEstimate
 from lemtomap.types import EdgeType, GridView
 
 SEAM_SHARE = 2.0
@@ -76,7 +76,7 @@ class NeighbourFinder:
             for seam in islice(seams, 1):
                 yield replace(seam, share=0.0)
 
-    def _is_open(self, here: Standing, there: Standing, grid: GridView) -> bool:
+    def _is_open(self, here: NodePoseEstimate, there: NodePoseEstimate, grid: GridView) -> bool:
         """Tell whether the robot could go from one to the other wherever the other may truly be."""
         if _is_sure(there, self._config.seam_sigma_m):
             return True
@@ -114,7 +114,7 @@ class NeighbourFinder:
         return Edge(0, node_id, other_id, T_node_other, covariance, EdgeType.NEAR_NEIGHBOUR, share)
 
 
-def _is_sure(standing: Standing, sigma_m: float) -> bool:
+def _is_sure(standing: NodePoseEstimate, sigma_m: float) -> bool:
     """Tell whether a node stands in the window by measurement, or is predicted well enough."""
     return standing.anchored or standing.is_within(sigma_m)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.drivers.hokuyo.events import LaserScan
-from lemtomap.drivers.kobuki.battery import Source as PowerSource
+from lemtomap.drivers.kobuki.battery import PowerSource
 from lemtomap.drivers.kobuki.events import BumperEvent, CliffEvent, KobukiSample
 from lemtomap.drivers.kobuki.packets import Bumper, Cliff
 from lemtomap.nav import types as nav
@@ -46,7 +46,7 @@ def contact_of(event: object) -> nav.Contact | None:
     return None
 
 
-def deskewed_sighting(scan: Scan, T_odom_base_beams: Pose) -> nav.Sighting:
+def deskewed_sighting(scan: Scan, T_odom_base_beams: Pose) -> nav.ObstacleSighting:
     """Return a scan's points in the base frame of its stamp, each moved by the motion until its beam.
 
     T_odom_base_beams: float64 (N, 3), where the base was at each beam; the first one is the scan's own pose.
@@ -64,7 +64,7 @@ def deskewed_sighting(scan: Scan, T_odom_base_beams: Pose) -> nav.Sighting:
         return np.asarray(T_base_lasers[which, :2] + reach)
 
     origin = (float(scan.T_base_laser[0]), float(scan.T_base_laser[1]))
-    return nav.Sighting(
+    return nav.ObstacleSighting(
         stamp_s=scan.stamp_s,
         T_odom_base=T_odom_base_beams[0],
         hits_base=ends(hit, ranges[hit]),
@@ -88,7 +88,7 @@ def scan_of(seen: LaserScan, T_base_laser: Pose) -> Scan:
     )
 
 
-def points_now(sighting: nav.Sighting, odometry: Odometry) -> NDArray[np.float64]:
+def points_now(sighting: nav.ObstacleSighting, odometry: Odometry) -> NDArray[np.float64]:
     """Return the hits of a scan in the base frame of now, float64 (N, 2), metres."""
     T_now_then = se2.between(odometry.T_odom_base, sighting.T_odom_base)
     return se2.transform(T_now_then, sighting.hits_base)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.nav.types import Sighting
+from lemtomap.nav.types import ObstacleSighting
 from lemtomap.robot.exchange import Exchange
 
 PERIOD_S = 0.2  # at 0.5 m/s the robot moves 0.1 m, two cells of the window, from look to look
@@ -33,4 +33,4 @@ class DepthFeed:
         self._due_s = now_s + self._period_s - 1e-6
         cloud = self._look()
         if len(cloud):
-            self._exchange.sightings.put(Sighting.from_cloud(now_s, odometry.T_odom_base, cloud))
+            self._exchange.sightings.put(ObstacleSighting.from_cloud(now_s, odometry.T_odom_base, cloud))

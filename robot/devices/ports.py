@@ -23,7 +23,7 @@ class PortInfo(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Identity:
+class UsbIdentity:
     """How one kind of device shows itself on USB."""
 
     name: str
@@ -36,13 +36,13 @@ class Identity:
     """The stable name that our udev rules make."""
 
 
-KOBUKI = Identity("Kobuki base", "kobuki", 0x0403, 0x6001, ("kobuki", "yujin"), "/dev/kobuki")
-HOKUYO = Identity("Hokuyo laser", "hokuyo", 0x15D1, 0x0000, (), "/dev/hokuyo")
+KOBUKI = UsbIdentity("Kobuki base", "kobuki", 0x0403, 0x6001, ("kobuki", "yujin"), "/dev/kobuki")
+HOKUYO = UsbIdentity("Hokuyo laser", "hokuyo", 0x15D1, 0x0000, (), "/dev/hokuyo")
 
 ListPorts = Callable[[], Iterable[PortInfo]]
 
 
-def find(identity: Identity, ports: ListPorts = list_ports.comports) -> str:
+def find(identity: UsbIdentity, ports: ListPorts = list_ports.comports) -> str:
     """Return the path of the one port with this identity.
 
     Raises PortMissing when there is none, BadSetting when there are several to choose from.
@@ -64,7 +64,7 @@ def find(identity: Identity, ports: ListPorts = list_ports.comports) -> str:
     )
 
 
-def matches_identity(port: PortInfo, identity: Identity) -> bool:
+def matches_identity(port: PortInfo, identity: UsbIdentity) -> bool:
     """Tell whether a port shows this identity; a bare FTDI chip (0403:6001) may be anything, not a Kobuki."""
     if (port.vid, port.pid) != (identity.vid, identity.pid):
         return False

@@ -25,7 +25,7 @@ from lemtomap.robot.devices.recording import (
     SCAN_TOPIC,
     UP,
     Call,
-    Entry,
+    RecordedCall,
 )
 
 PLACES_AT_ONCE = 5  # of damage named to the user
@@ -89,7 +89,7 @@ class Recording:
         """Whether the oldest part is the run's first; a recording that passed its limit lost that."""
         return part_number(self._files[0].path) == 1
 
-    def entries(self) -> Iterator[Entry | Gap]:
+    def entries(self) -> Iterator[RecordedCall | Gap]:
         """Yield every session's call in order, and a gap wherever bytes are missing."""
         gaps, streams = iter(self.gaps), False
         if not self.begins_at_start:
@@ -101,7 +101,7 @@ class Recording:
                 if not streams and gap.until_s is not None:
                     yield from self._opening()
             elif found.topic in RAW_TOPICS:
-                entry = Entry(*RAW_TOPICS[found.topic], found.stamp_ns, found.data)
+                entry = RecordedCall(*RAW_TOPICS[found.topic], found.stamp_ns, found.data)
                 streams = streams or (entry.call is Call.PORT and entry.data == UP)
                 yield entry
 
@@ -176,14 +176,14 @@ class Recording:
             self.gaps.append(Gap(last_ns * 1e-9, None, hole.reason))
         self.begins_s, self.ends_s = first_ns * 1e-9, last_ns * 1e-9
 
-    def _opening(self) -> list[Entry]:
+    def _opening(self) -> list[RecordedCall]:
         """Return the laser's conversation as it was first written again."""
-        calls: list[Entry] = []
+        calls: list[RecordedCall] = []
         for found in self._sound():
             if isinstance(found, Message) and found.topic in AGAIN_TOPICS:
-                opened = Entry(HOKUYO, Call.PORT, found.made_ns, OPENED)
+                opened = RecordedCall(HOKUYO, Call.PORT, found.made_ns, OPENED)
                 calls += [] if calls else [opened]
-                calls.append(Entry(*AGAIN_TOPICS[found.topic], found.made_ns, found.data))
+                calls.append(RecordedCall(*AGAIN_TOPICS[found.topic], found.made_ns, found.data))
                 if calls[-1].call is Call.PORT and found.data == UP:
                     break
         return calls

@@ -50,7 +50,7 @@ class Call(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class RecordedCall:
     """One call of a device's session."""
 
     device: str
@@ -79,15 +79,15 @@ class Opening:
     """The laser's conversation from the opening of its port until it streams."""
 
     def __init__(self) -> None:
-        self._calls: list[Entry] = []
+        self._calls: list[RecordedCall] = []
         self._streams = self._dropped = False
 
     @property
-    def calls(self) -> list[Entry]:
+    def calls(self) -> list[RecordedCall]:
         """All of it, once the laser streams; else nothing."""
         return self._calls if self._streams else []
 
-    def take(self, entry: Entry) -> None:
+    def take(self, entry: RecordedCall) -> None:
         """Keep a call that belongs to it."""
         if entry.device != HOKUYO:
             return
@@ -115,7 +115,7 @@ class Recorder:
         self._stamp_ns = 0
         self._begin_part()
 
-    def raw(self, entry: Entry) -> None:
+    def raw(self, entry: RecordedCall) -> None:
         """Write one call of a session."""
         self._roll_when_full()
         self._opening.take(entry)

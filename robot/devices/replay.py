@@ -16,9 +16,9 @@ from lemtomap.robot.devices.recording import (
     LOST,
     OPENED,
     Call,
-    Entry,
+    RecordedCall,
 )
-from lemtomap.robot.devices.wire import E, Session
+from lemtomap.robot.devices.wire import E, RecordedSession
 from lemtomap.robot.exchange import TimedScan
 
 BRIDGED_S = 4.0  # the encoders count 65,536 ticks, 5.6 m: after longer they may have gone round unseen
@@ -89,7 +89,7 @@ class _MappedThen:
         return replace(timed, lifted=then.lifted)
 
 
-def _repeat(entry: Entry, session: Session[E]) -> list[E]:
+def _repeat(entry: RecordedCall, session: RecordedSession[E]) -> list[E]:
     """Make the recorded call again."""
     if entry.call is Call.RECEIVE:
         return session.receive(entry.data, entry.now_s)

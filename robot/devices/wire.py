@@ -13,15 +13,15 @@ from lemtomap.robot.devices.recording import (
     OPENED,
     UP,
     Call,
-    Entry,
+    RecordedCall,
 )
 
 E = TypeVar("E")
 
-Sink = Callable[[Entry], None]
+Sink = Callable[[RecordedCall], None]
 
 
-class Session(Protocol[E]):
+class RecordedSession(Protocol[E]):
     """What both devices' sessions share."""
 
     def receive(self, data: bytes, now_s: float) -> list[E]:
@@ -48,12 +48,12 @@ class RecordedKobukiSession(KobukiSession):
         """Take bytes, return events."""
         events = super().receive(data, now_s)
         if data or events:
-            self._record(Entry(KOBUKI, Call.RECEIVE, stamp_ns(now_s), data))
+            self._record(RecordedCall(KOBUKI, Call.RECEIVE, stamp_ns(now_s), data))
         return events
 
     def tick(self, now_s: float) -> bytes:
         """Return the bytes to send now."""
-        self._record(Entry(KOBUKI, Call.TICK, stamp_ns(now_s)))
+        self._record(RecordedCall(KOBUKI, Call.TICK, stamp_ns(now_s)))
         return super().tick(now_s)
 
 
@@ -73,15 +73,15 @@ class RecordedHokuyoSession(HokuyoSession):
         """Take bytes, return events."""
         events = super().receive(data, now_s)
         if data or events:
-            self._record(Entry(HOKUYO, Call.RECEIVE, stamp_ns(now_s), data))
+            self._record(RecordedCall(HOKUYO, Call.RECEIVE, stamp_ns(now_s), data))
         if self.alive and not self._streams:
             self._streams = True
-            self._record(Entry(HOKUYO, Call.PORT, stamp_ns(now_s), UP))
+            self._record(RecordedCall(HOKUYO, Call.PORT, stamp_ns(now_s), UP))
         return events
 
     def tick(self, now_s: float) -> bytes:
         """Return the bytes to send now."""
-        self._record(Entry(HOKUYO, Call.TICK, stamp_ns(now_s)))
+        self._record(RecordedCall(HOKUYO, Call.TICK, stamp_ns(now_s)))
         return super().tick(now_s)
 
 
@@ -101,7 +101,7 @@ class Wire(Generic[E]):
     """One device in lock-step. An unplugged cable is noticed, and its session begins anew when it is back."""
 
     def __init__(
-        self, name: str, port: SteppedPort, session: Session[E], record: Sink, broken: type[Exception]
+        self, name: str, port: SteppedPort, session: RecordedSession[E], record: Sink, broken: type[Exception]
     ) -> None:
         self.name, self.session = name, session
         self._port, self._record, self._broken = port, record, broken
@@ -116,14 +116,14 @@ class Wire(Generic[E]):
         except self._broken:
             if self._open:
                 self._open = False
-                self._record(Entry(self.name, Call.PORT, stamp_ns(now_s), LOST))
+                self._record(RecordedCall(self.name, Call.PORT, stamp_ns(now_s), LOST))
             data, self.lost = b"", (self.name,)
         else:
             self.lost = ()
             if not self._open:
                 self._open = True
                 self.session.reopened()
-                self._record(Entry(self.name, Call.PORT, stamp_ns(now_s), OPENED))
+                self._record(RecordedCall(self.name, Call.PORT, stamp_ns(now_s), OPENED))
         events = self.session.receive(data, now_s)
         self.write(self.session.tick(now_s), now_s)
         return events
@@ -136,4 +136,4 @@ class Wire(Generic[E]):
             self._port.write(data)
         except self._broken:
             return
-        self._record(Entry(self.name, Call.SEND, stamp_ns(now_s), data))
+        self._record(RecordedCall(self.name, Call.SEND, stamp_ns(now_s), data))

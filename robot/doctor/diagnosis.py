@@ -13,8 +13,8 @@ from lemtomap.drivers.hokuyo import events as hokuyo
 from lemtomap.drivers.hokuyo.packets import BadReply
 from lemtomap.drivers.identify import HOKUYO, KOBUKI
 from lemtomap.drivers.kobuki import events as kobuki
-from lemtomap.drivers.kobuki.battery import Level as BatteryLevel
-from lemtomap.drivers.kobuki.battery import Source
+from lemtomap.drivers.kobuki.battery import ChargeLevel as BatteryLevel
+from lemtomap.drivers.kobuki.battery import PowerSource
 from lemtomap.drivers.kobuki.packets import BadFrame
 
 BASE, LASER = "Kobuki base", "Hokuyo laser"
@@ -158,7 +158,7 @@ def _gyro(samples: Sequence[kobuki.KobukiSample]) -> Iterator[Finding]:
 def _power(sample: kobuki.KobukiSample) -> Iterator[Finding]:
     battery = sample.battery
     text = f"battery {battery.voltage_v:.1f} V, {battery.percent:.0f} %"
-    if battery.source is Source.ADAPTER:
+    if battery.source is PowerSource.ADAPTER:
         yield Finding(Verdict.WARNING, BASE, f"{text}, charging by cable", "pull the cable before driving")
     elif battery.level in {BatteryLevel.LOW, BatteryLevel.CRITICAL}:
         grave = battery.level is BatteryLevel.CRITICAL

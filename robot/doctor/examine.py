@@ -20,7 +20,7 @@ from lemtomap.drivers.port import open_serial
 from lemtomap.errors import BadSetting
 from lemtomap.robot.clock import MonotonicClock
 from lemtomap.robot.devices import ports
-from lemtomap.robot.devices.ports import Identity, ListPorts
+from lemtomap.robot.devices.ports import ListPorts, UsbIdentity
 from lemtomap.robot.doctor.diagnosis import (
     BASE,
     LASER,
@@ -70,7 +70,7 @@ def check_machine() -> Iterator[Finding]:
 
 
 def check_port(
-    identity: Identity, subject: str, path: str, sys_root: Path = Path("/sys")
+    identity: UsbIdentity, subject: str, path: str, sys_root: Path = Path("/sys")
 ) -> Iterator[Finding]:
     """Check what the system knows of a port without opening it."""
     name = Path(path).resolve().name
@@ -95,7 +95,7 @@ def holders_of(path: str) -> list[str]:
     return found
 
 
-def _listen(identity: Identity, subject: str, path: str, listen_s: float) -> Iterator[Finding]:
+def _listen(identity: UsbIdentity, subject: str, path: str, listen_s: float) -> Iterator[Finding]:
     """Converse with the device for a while without moving anything, and judge what it told."""
     told: list[object] = []
     try:
@@ -110,7 +110,7 @@ def _listen(identity: Identity, subject: str, path: str, listen_s: float) -> Ite
     yield from (judge_base if identity is ports.KOBUKI else judge_laser)(told)
 
 
-async def _converse(identity: Identity, path: str, listen_s: float, told: list[object]) -> None:
+async def _converse(identity: UsbIdentity, path: str, listen_s: float, told: list[object]) -> None:
     driver: Any = KobukiDriver if identity is ports.KOBUKI else HokuyoDriver
     clock = MonotonicClock()
     running = driver(

@@ -28,7 +28,7 @@ class NamedGraph(RouteGraph, Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class MissionInput:
     """What a mission knows when it is asked."""
 
     now_s: float
@@ -60,7 +60,7 @@ class Order:
 class Mission(Protocol):
     """Asked after every navigation cycle."""
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Return what to do now."""
         ...
 
@@ -68,7 +68,7 @@ class Mission(Protocol):
 class Idle:
     """Stay where you are."""
 
-    def step(self, moment: Moment) -> Order:  # noqa: ARG002 -- nothing to look at
+    def step(self, moment: MissionInput) -> Order:  # noqa: ARG002 -- nothing to look at
         """Return no goal."""
         return Order(MissionState.WAITING)
 
@@ -81,7 +81,7 @@ class GoTo:
         self._goal: Goal | None = None
         self._asked_cycle = -1
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Give the goal once, then wait for the navigator's verdict."""
         if self._goal is None:
             node_id = resolve(self.place, moment)
@@ -105,7 +105,7 @@ class ChangeLevel:
     def __init__(self, level: int) -> None:
         self._level = level
 
-    def step(self, moment: Moment) -> Order:  # noqa: ARG002 -- a person knows
+    def step(self, moment: MissionInput) -> Order:  # noqa: ARG002 -- a person knows
         """Tell the map."""
         text = f"on level {self._level}"
         return Order(MissionState.DONE, text, cancel=True, events=(LevelChanged(self._level),))
@@ -118,7 +118,7 @@ class Dock:
         self._before: DockingOutput | None = None
         self._begun = False
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Hand the wheels over and wait for the verdict."""
         if not self._begun:
             self._begun, self._before = True, moment.docking
@@ -140,7 +140,7 @@ class Explore:
         self._config = config or NavConfig()
         self._explorer: Explorer | None = None
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Pass the explorer's goals on."""
         if self._explorer is None:
             self._explorer = Explorer(nav=self._config)
@@ -165,7 +165,7 @@ class Tour:
         self._target = 0
         self._missed = 0
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Look around at each node; give the next goal when the last one was reached or given up."""
         self._look(moment)
         if self._leg is not None:
@@ -181,7 +181,7 @@ class Tour:
         self._leg = GoTo(str(self._target))
         return Order(MissionState.RUNNING, self._text(), self._leg.step(moment).goal)
 
-    def _look(self, moment: Moment) -> None:
+    def _look(self, moment: MissionInput) -> None:
         """Tick off what is near."""
         here = moment.view.associated_id
         if here == self._here:
@@ -192,7 +192,7 @@ class Tour:
                 return
             self._seen.add(node_id)
 
-    def _next(self, moment: Moment) -> int:
+    def _next(self, moment: MissionInput) -> int:
         """Return the nearest node not seen yet; the start when there is none."""
         ways = ways_from(moment.graph, moment.view.associated_id)
         return next((node_id for _, node_id in ways if node_id not in self._seen), moment.start_id)
@@ -207,7 +207,7 @@ class Series:
     def __init__(self, missions: Sequence[Mission]) -> None:
         self._missions = list(missions)
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Ask the first mission that is not over."""
         order = self._missions[0].step(moment)
         if order.state is MissionState.DONE and len(self._missions) > 1:
@@ -216,7 +216,7 @@ class Series:
         return order
 
 
-def resolve(place: str, moment: Moment) -> int | None:
+def resolve(place: str, moment: MissionInput) -> int | None:
     """Return the node meant by a number, a name, `here`, `start` or `far`; None when there is none."""
     node_id = number(place)
     if node_id is not None and moment.graph.has_node(node_id):

@@ -8,7 +8,7 @@ import math
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.types import Goal, NavState
-from lemtomap.robot.missions.missions import Moment, Order
+from lemtomap.robot.missions.missions import MissionInput, Order
 from lemtomap.se2 import between
 from lemtomap.topo.events import NothingKnownHere
 
@@ -27,7 +27,7 @@ class Finder:
         self._asked_cycle: int | None = None
         self._explorer: Explorer | None = None
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Return where to go next; when all within reach was seen and nothing is known, tell the map so."""
         if moment.now_s - self._since_s < REST_S:
             return Order(text=LOOKING)
@@ -37,7 +37,7 @@ class Finder:
             return Order(text=LOOKING, goal=self._turn(moment))
         return self._drive(moment)
 
-    def _turning(self, moment: Moment) -> bool:
+    def _turning(self, moment: MissionInput) -> bool:
         """Tell whether the robot still turns."""
         asked = self._asked_cycle
         if asked is None:
@@ -46,7 +46,7 @@ class Finder:
         over = output.state in {NavState.ARRIVED, NavState.FAILED, NavState.IDLE}
         return output.cycle <= asked or not over
 
-    def _turn(self, moment: Moment) -> Goal:
+    def _turn(self, moment: MissionInput) -> Goal:
         self._asked_cycle = moment.output.cycle
         view = moment.view
         T_node_base = between(view.T_grid_node[view.associated_id], view.T_grid_base)
@@ -54,7 +54,7 @@ class Finder:
         heading_rad = math.remainder(yaw_rad + self._turns.pop(0), math.tau)
         return Goal(view.associated_id, (x_m, y_m), heading_rad)
 
-    def _drive(self, moment: Moment) -> Order:
+    def _drive(self, moment: MissionInput) -> Order:
         """Explore without a note of it: what is open here may long be known in the map."""
         self._asked_cycle = None
         self._explorer = self._explorer or Explorer(nav=self._config)

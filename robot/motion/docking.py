@@ -16,7 +16,7 @@ from collections import deque
 from dataclasses import dataclass
 from enum import StrEnum
 
-from lemtomap.drivers.kobuki.battery import Source
+from lemtomap.drivers.kobuki.battery import PowerSource
 from lemtomap.drivers.kobuki.events import KobukiSample
 from lemtomap.drivers.kobuki.packets import TICKS_PER_METRE, DockSector
 
@@ -120,7 +120,7 @@ class Docking:
         self._recent.append((ir.right, ir.center, ir.left))
         if self.state in {DockingState.DOCKED, DockingState.FAILED}:
             return self._output(0.0, 0.0)
-        if sample.battery.source is Source.ADAPTER:
+        if sample.battery.source is PowerSource.ADAPTER:
             return self._fail("the charging cable is plugged in")
         if now_s - self._begin_s > self.config.limit_s:
             return self._fail(f"not docked after {self.config.limit_s:.0f} s")

@@ -54,7 +54,7 @@ class Keys:
 
 
 @dataclass(frozen=True, slots=True)
-class Listener:
+class KeyListener:
     """Who hears what the person at the keyboard wants."""
 
     offer: Callable[[Twist, float], None]
@@ -65,7 +65,7 @@ class Listener:
 
 
 @contextmanager
-def driven_by_hand(listener: Listener, now_s: Callable[[], float]) -> Iterator[None]:
+def driven_by_hand(listener: KeyListener, now_s: Callable[[], float]) -> Iterator[None]:
     """Pass on what the terminal says while the body runs. Raises BadSetting without a terminal."""
     if not sys.stdin.isatty():
         raise BadSetting("teleop: needs a terminal to read keys from")

@@ -13,7 +13,7 @@ from lemtomap.types import Twist
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class CommandSource:
     """One that may command the robot."""
 
     name: str
@@ -22,10 +22,10 @@ class Source:
     timeout_s: float
 
 
-SAFETY = Source("safety", 100, 0.3)
-TELEOP = Source("teleop", 50, 0.5)
-DOCKING = Source("docking", 30, 0.3)
-NAVIGATION = Source("navigation", 10, 0.3)
+SAFETY = CommandSource("safety", 100, 0.3)
+TELEOP = CommandSource("teleop", 50, 0.5)
+DOCKING = CommandSource("docking", 30, 0.3)
+NAVIGATION = CommandSource("navigation", 10, 0.3)
 SOURCES = (SAFETY, TELEOP, DOCKING, NAVIGATION)
 
 
@@ -41,15 +41,15 @@ class Wish:
 class VelocityMux:
     """Choose the freshest wish of the most important source that is not silent."""
 
-    def __init__(self, sources: tuple[Source, ...] = SOURCES) -> None:
+    def __init__(self, sources: tuple[CommandSource, ...] = SOURCES) -> None:
         self._sources = sorted(sources, key=lambda source: -source.priority)
         self._wishes: dict[str, Wish] = {}
 
-    def offer(self, source: Source, twist: Twist, now_s: float) -> None:
+    def offer(self, source: CommandSource, twist: Twist, now_s: float) -> None:
         """Take a wish; a newer one of the same source replaces it."""
         self._wishes[source.name] = Wish(source.name, twist, now_s)
 
-    def withdraw(self, source: Source) -> None:
+    def withdraw(self, source: CommandSource) -> None:
         """Forget what a source wished."""
         self._wishes.pop(source.name, None)
 

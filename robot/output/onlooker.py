@@ -15,12 +15,12 @@ from lemtomap import se2
 from lemtomap.nav.types import NavOutput
 from lemtomap.robot.core import Efforts
 from lemtomap.robot.devices.mapped_scan import to_values
-from lemtomap.robot.devices.recording import SCAN_TOPIC, Entry, Recorder
+from lemtomap.robot.devices.recording import SCAN_TOPIC, RecordedCall, Recorder
 from lemtomap.robot.exchange import (
     BaseStatus,
     Exchange,
-    Level,
     Note,
+    NoteLevel,
     TimedScan,
 )
 from lemtomap.robot.mailbox import BoundedQueue, Latest
@@ -43,7 +43,7 @@ class Onlooker:
         recorder: Recorder | None = None,
         say: Callable[[Note], None] | None = None,
     ) -> None:
-        self.raw: BoundedQueue[Entry] = BoundedQueue("bytes for the recorder", RAW_WAITING)
+        self.raw: BoundedQueue[RecordedCall] = BoundedQueue("bytes for the recorder", RAW_WAITING)
         self.skipped: dict[str, int] = {}
         """How many snapshots of each kind came and went between two looks."""
         self.over = ""
@@ -96,7 +96,7 @@ class Onlooker:
 
     def warn(self, source: str, text: str) -> None:
         """Leave a line for the user, from any thread."""
-        self._exchange.note(self.now_s, source, text, Level.WARN)
+        self._exchange.note(self.now_s, source, text, NoteLevel.WARN)
 
     def close(self) -> None:
         """Finish the recordings."""
@@ -157,7 +157,7 @@ class Onlooker:
         recorder: Recorder,
         now_s: float,
         notes: Sequence[Note],
-        entries: Sequence[Entry],
+        entries: Sequence[RecordedCall],
         view: MapView | None,
         output: NavOutput | None,
         status: BaseStatus | None,

@@ -13,7 +13,7 @@ from lemtomap.nav.types import Goal, NavState
 from lemtomap.robot.baseline import build_metric_core
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.exchange import MissionState
-from lemtomap.robot.missions.missions import Moment, Order
+from lemtomap.robot.missions.missions import MissionInput, Order
 from lemtomap.robot.output import files as outputs
 from lemtomap.robot.output.progress import Bar
 from lemtomap.robot.runs.lockstep import run_lockstep
@@ -39,7 +39,7 @@ class Points:
         self._now: Point | None = None
         self._asked_cycle = -1
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Give the next point when the last one is reached; fail when one is not."""
         now, state = self._now, moment.output.state
         fresh = moment.output.cycle > self._asked_cycle

@@ -17,7 +17,7 @@ from lemtomap.robot.config import PortsConfig, RobotConfig, load
 from lemtomap.robot.devices import ports
 from lemtomap.robot.devices.parts import DEFAULT_LIMIT
 from lemtomap.robot.missions.missions import parse_mission
-from lemtomap.robot.motion.teleop import Listener, driven_by_hand
+from lemtomap.robot.motion.teleop import KeyListener, driven_by_hand
 from lemtomap.robot.output.display import has_display
 from lemtomap.robot.output.progress import Bar, first_use
 from lemtomap.robot.runs.run import Run, RunPlan, Teller
@@ -85,7 +85,7 @@ def _hands(options: RobotOptions, runtime: Runtime) -> AbstractContextManager[No
     def change_level(level: int) -> None:
         core.exchange.nav_events.put(LevelChanged(level))
 
-    return driven_by_hand(Listener(core.base.teleop, change_level, runtime.stop.set), runtime.clock.now_s)
+    return driven_by_hand(KeyListener(core.base.teleop, change_level, runtime.stop.set), runtime.clock.now_s)
 
 
 def find_ports(config: PortsConfig, options: RobotOptions) -> PortsConfig:

@@ -17,9 +17,9 @@ from lemtomap.robot.devices.parts import DEFAULT_LIMIT, parts_of
 from lemtomap.robot.devices.recording import HOKUYO, KOBUKI
 from lemtomap.robot.exchange import (
     Ended,
-    Level,
     MissionState,
     Note,
+    NoteLevel,
 )
 from lemtomap.robot.output.progress import Bar
 from lemtomap.robot.runs.folder import RunFolder, Space
@@ -65,7 +65,7 @@ class Teller:
     def say(self, note: Note) -> None:
         """Say a line, unless nearly the same one was said a moment ago."""
         kind = f"{note.source} {re.sub(r'[0-9]+', '#', note.text)}"
-        if note.level is Level.INFO and note.stamp_s < self._said.get(kind, -QUIET_S) + QUIET_S:
+        if note.level is NoteLevel.INFO and note.stamp_s < self._said.get(kind, -QUIET_S) + QUIET_S:
             return
         self._said[kind] = note.stamp_s
         self._bar.say(f"{note.stamp_s:7.1f} s  {note.source}: {note.text}")

@@ -36,7 +36,7 @@ RESULTS = ("trajectory.tum", "grid.pgm", "grid.yaml", "overview.png", "summary.j
 LOOK_LIMIT_S, CLOSE_LIMIT_S, WRITE_LIMIT_S, PICTURE_LIMIT_S, SOLVE_LIMIT_S = 5.0, 10.0, 20.0, 60.0, 180.0
 
 
-class Listener(Protocol):
+class Observer(Protocol):
     """Who tells the user."""
 
     def say(self, note: Note) -> None:
@@ -77,7 +77,7 @@ class RunFiles(Onlooker):
         folder: RunFolder,
         spaces: Sequence[Space],
         core: RobotCore,
-        listener: Listener,
+        listener: Observer,
         record: RecordPlan,
     ) -> None:
         self._folder, self._spaces = folder, spaces

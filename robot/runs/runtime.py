@@ -31,10 +31,10 @@ from lemtomap.robot.devices.recording import (
     LOST,
     OPENED,
     Call,
-    Entry,
+    RecordedCall,
 )
 from lemtomap.robot.devices.wire import RecordedHokuyoSession, RecordedKobukiSession
-from lemtomap.robot.exchange import Ended, Level, MissionState
+from lemtomap.robot.exchange import Ended, MissionState, NoteLevel
 from lemtomap.robot.missions.missions import Mission
 from lemtomap.robot.output.onlooker import Onlooker
 from lemtomap.robot.runs.interrupts import on_interrupt
@@ -184,15 +184,17 @@ class Runtime:
 
     def _send(self, data: bytes, now_s: float) -> None:
         if self._kobuki.write(data):
-            self.onlooker.raw.put(Entry(KOBUKI, Call.SEND, stamp_ns(now_s), data))
+            self.onlooker.raw.put(RecordedCall(KOBUKI, Call.SEND, stamp_ns(now_s), data))
 
     def _port_changed(self, device: str, event: PortOpened | PortLost) -> None:
         opened = isinstance(event, PortOpened)
-        self.onlooker.raw.put(Entry(device, Call.PORT, stamp_ns(event.stamp_s), OPENED if opened else LOST))
+        self.onlooker.raw.put(
+            RecordedCall(device, Call.PORT, stamp_ns(event.stamp_s), OPENED if opened else LOST)
+        )
         if isinstance(event, PortLost):
             self._lost.append(device)
             self._soon()
-            self.core.exchange.note(event.stamp_s, device, str(event.error), Level.WARN)
+            self.core.exchange.note(event.stamp_s, device, str(event.error), NoteLevel.WARN)
 
     def _raise_first(self, *tasks: "asyncio.Task[None]") -> None:
         if self._crash is not None:

@@ -22,9 +22,9 @@ from lemtomap.robot.devices.bridge import deskewed_sighting
 from lemtomap.robot.exchange import TimedScan
 from lemtomap.robot.missions.missions import Explore
 from lemtomap.se2 import Pose, between
-from lemtomap.topo.loops.config import MatchConfig
+from lemtomap.topo.loops.config import SearchConfig
 from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
-from lemtomap.topo.loops.places import Company
+from lemtomap.topo.loops.places import LocalSubmap
 from lemtomap.types import Odometry, Scan
 
 STEP_M, TURN_RAD, SCAN_S = 0.25, 0.5, 0.1
@@ -68,7 +68,7 @@ def warm_up(config: RobotConfig, slam: str = DEFAULT_SLAM) -> None:
 def _tell_rivals_apart() -> None:
     """Hold two pictures against each other: no place of the imagined corridor is like another."""
     points = np.zeros((1, 2))
-    placed = Placed(picture_of(Company(1, points, points), MatchConfig()), np.zeros(3))
+    placed = Placed(picture_of(LocalSubmap(1, points, points), SearchConfig()), np.zeros(3))
     told_apart(points, placed, placed)
 
 

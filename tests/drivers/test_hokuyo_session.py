@@ -16,7 +16,7 @@ from lemtomap.drivers.hokuyo.events import (
 )
 from lemtomap.drivers.hokuyo.scans import View
 from lemtomap.drivers.hokuyo.session import HokuyoConfig, HokuyoSession
-from lemtomap.drivers.hokuyo.steps import Step
+from lemtomap.drivers.hokuyo.steps import HandshakeStep
 
 STEP_S = 0.1 / 1024
 
@@ -379,4 +379,4 @@ def test_parameters_damaged_on_the_way_are_asked_for_again():
     bench.first_scan()
     assert bench.urg.heard.count(b"PP") == 2
     assert of(bench.events, SensorInfo)[0].parameters.max_mm == 5600
-    assert bench.session.step is Step.STREAM
+    assert bench.session.step is HandshakeStep.STREAM

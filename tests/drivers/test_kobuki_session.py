@@ -7,9 +7,9 @@ from device_side import KOBUKI_VERSIONS, Urg, kobuki_feedback
 from lemtomap.drivers.kobuki.battery import (
     BatteryConfig,
     BatteryModel,
-    Level,
+    ChargeLevel,
     PowerChange,
-    Source,
+    PowerSource,
 )
 from lemtomap.drivers.kobuki.commands import Led, Tune
 from lemtomap.drivers.kobuki.events import (
@@ -299,7 +299,7 @@ def test_battery_falls_through_its_levels_once_and_not_by_a_sag():
     ]
     battery, changes = follow(BatteryModel(BatteryConfig()), rows)
     assert [change for _, change in changes] == [PowerChange.BATTERY_LOW, PowerChange.BATTERY_CRITICAL]
-    assert (battery.level, battery.percent) == (Level.CRITICAL, pytest.approx(5 - 95 * 0.1 / 3.3))
+    assert (battery.level, battery.percent) == (ChargeLevel.CRITICAL, pytest.approx(5 - 95 * 0.1 / 3.3))
 
 
 def test_charging_is_followed_and_the_false_charged_of_old_firmware_is_not():
@@ -312,7 +312,7 @@ def test_charging_is_followed_and_the_false_charged_of_old_firmware_is_not():
         (19.5, PowerChange.PLUGGED_TO_ADAPTER),
     ]
     assert (battery.source, battery.charging, battery.percent) == (
-        Source.ADAPTER,
+        PowerSource.ADAPTER,
         True,
         pytest.approx(96.9, abs=0.2),
     )

@@ -21,7 +21,7 @@ from lemtomap.robot.devices.wire import RecordedHokuyoSession, RecordedKobukiSes
 from lemtomap.robot.exchange import Exchange
 from lemtomap.robot.motion.safety import Reason
 from lemtomap.sim import worlds
-from lemtomap.sim.base import BaseConfig, BatteryConfig
+from lemtomap.sim.base import BaseConfig, SimulatedBattery
 from lemtomap.sim.errors import Unplugged
 from lemtomap.sim.simulator import SimConfig, Simulator
 from lemtomap.types import Twist
@@ -144,7 +144,7 @@ def test_a_pulled_plug_stops_in_one_step_and_a_replug_goes_on(driving, device, r
 
 
 def test_an_empty_battery_stops_and_is_seen_and_heard():
-    stage = Stage(SimConfig(base=BaseConfig(battery=BatteryConfig(start_share=0.0, empty_v=13.0))))
+    stage = Stage(SimConfig(base=BaseConfig(battery=SimulatedBattery(start_share=0.0, empty_v=13.0))))
     stage.drive(9.0, Twist(0.1, 0.3))
     assert stage.sent[-1].reason is Reason.BATTERY_EMPTY
     assert Light(2, Led.ORANGE) in stage.signals

@@ -7,9 +7,9 @@ import pytest
 
 from lemtomap.sim import worlds
 from lemtomap.sim.movers import Appearing, Person, SwingDoor
-from lemtomap.sim.route import RoutePlanner
+from lemtomap.sim.route import FloorRoutePlanner
 from lemtomap.sim.simulator import Simulator
-from lemtomap.sim.tours import Tour, base_command, drive
+from lemtomap.sim.tours import ScriptedTour, base_command, drive
 from lemtomap.sim.world import Box
 
 FAR = (50.0, 50.0, 0.0)
@@ -112,8 +112,8 @@ def test_cliff_is_felt_before_the_wheels_and_then_they_hang(tmp_path):
 def test_ramp_lifts_the_robot_to_the_next_storey_and_the_gyro_feels_it():
     world = worlds.load("storeys:2")
     simulator = Simulator(world, 1)
-    path = RoutePlanner(world.raster).through([(2.0, 5.0), (0.75, 10.8), (15.25, 10.8), (14.0, 8.0)])
-    pitch = [simulator.base.body.state.pitch for _ in drive(simulator, Tour(path), 120.0)]
+    path = FloorRoutePlanner(world.raster).through([(2.0, 5.0), (0.75, 10.8), (15.25, 10.8), (14.0, 8.0)])
+    pitch = [simulator.base.body.state.pitch for _ in drive(simulator, ScriptedTour(path), 120.0)]
     truth = simulator.truth()
     simulator.close()
     assert truth.room == "1/lobby"

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from lemtomap.sim.hokuyo import HokuyoConfig, HokuyoFirmware
+from lemtomap.sim.hokuyo import FakeHokuyoConfig, HokuyoFirmware
 
 
 def scanner(**settings) -> HokuyoFirmware:
-    return HokuyoFirmware(HokuyoConfig(power_on_ms=66051, clock_ppm=0.0, **settings))
+    return HokuyoFirmware(FakeHokuyoConfig(power_on_ms=66051, clock_ppm=0.0, **settings))
 
 
 def ranges() -> np.ndarray:
@@ -84,7 +84,7 @@ def test_cluster_gives_the_smallest_valid_distance():
 
 
 def test_full_scan_is_32_lines_and_timer_wraps():
-    device = HokuyoFirmware(HokuyoConfig(power_on_ms=0xFFFFFF, clock_ppm=0.0))
+    device = HokuyoFirmware(FakeHokuyoConfig(power_on_ms=0xFFFFFF, clock_ppm=0.0))
     device.receive(b"MD0044072501000\n", 0.0)
     reply = device.scan_done(0.001, ranges())
     assert len(reply) == 2137

@@ -4,7 +4,7 @@ import pytest
 
 from lemtomap.sim.kobuki import (
     BaseReadings,
-    KobukiConfig,
+    FakeKobukiConfig,
     KobukiFirmware,
     wheel_speeds_mmps,
 )
@@ -86,7 +86,7 @@ def test_command_is_found_between_garbage_and_a_damaged_frame():
 
 
 def test_wheels_stop_when_the_host_falls_silent():
-    firmware = KobukiFirmware(KobukiConfig(command_timeout_s=0.6))
+    firmware = KobukiFirmware(FakeKobukiConfig(command_timeout_s=0.6))
     firmware.receive(bytes.fromhex("AA550601046400000067"), 1.0)
     assert firmware.wheel_targets_mps(1.59) == (0.1, 0.1)
     assert firmware.wheel_targets_mps(1.61) == (0.0, 0.0)

@@ -6,7 +6,7 @@ import pytest
 from lemtomap.sim import worlds
 from lemtomap.sim.carmen import NO_RETURN_M, record_tour
 from lemtomap.sim.errors import BadWorld
-from lemtomap.sim.route import RoutePlanner
+from lemtomap.sim.route import FloorRoutePlanner
 from lemtomap.sim.simulator import Simulator
 from lemtomap.sim.tours import (
     base_command,
@@ -23,7 +23,7 @@ def office():
 
 
 def test_route_keeps_off_the_walls_and_says_when_there_is_none(office):
-    planner = RoutePlanner(office.raster)
+    planner = FloorRoutePlanner(office.raster)
     path = planner.path((1.0, 1.0), (13.0, 2.0))
     assert np.hypot(*np.diff(path, axis=0).T).max() < 0.2
     for x, y in path:
@@ -82,7 +82,7 @@ def test_commands_match_the_worked_frames(v, w, frame):
 def test_a_way_through_the_open_is_straight():
     occupied = np.zeros((240, 240), dtype=bool)
     occupied[[0, -1]] = occupied[:, [0, -1]] = True
-    planner = RoutePlanner(Raster(occupied, ~occupied, 0.05, (0.0, 0.0)))
+    planner = FloorRoutePlanner(Raster(occupied, ~occupied, 0.05, (0.0, 0.0)))
     path = planner.path((1.0, 1.0), (9.0, 5.0))
     length_m = float(np.hypot(*np.diff(path, axis=0).T).sum())
     assert length_m < 1.02 * np.hypot(8.0, 4.0), "eight directions make it 1.06 times as long"

@@ -27,9 +27,9 @@ from lemtomap.robot.logs import open_log
 from lemtomap.se2 import Pose, between, compose
 from lemtomap.sim import worlds
 from lemtomap.sim.carmen import record_tour
-from lemtomap.sim.route import RoutePlanner, path_length_m
+from lemtomap.sim.route import FloorRoutePlanner, path_length_m
 from lemtomap.sim.simulator import Simulator
-from lemtomap.sim.tours import Tour, plan_errand
+from lemtomap.sim.tours import ScriptedTour, plan_errand
 from lemtomap.sim.world import Raster, World
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.file.store import TopoStore
@@ -72,7 +72,7 @@ def record(world: World, metres: float, seeds: int, folder: Path) -> list[Path]:
     for seed, log in missing:
         assert path is not None  # noqa: S101
         part = log.with_suffix(".part")
-        record_tour(Simulator(world, seed=seed), Tour(path), part)
+        record_tour(Simulator(world, seed=seed), ScriptedTour(path), part)
         part.rename(log)
         print(f"recorded {log}", file=sys.stderr, flush=True)
     return logs
@@ -131,7 +131,7 @@ def _detour(mapper: TopoMapper, born: dict[int, Pose], world: World) -> float:
     over_edges = nx.single_source_dijkstra_path_length(graph, 1)
     goal = max(over_edges, key=lambda node_id: over_edges[node_id])
     ends = [(float(born[node_id][0]), float(born[node_id][1])) for node_id in (1, goal)]
-    true_m = path_length_m(RoutePlanner(world.raster).path(*ends))
+    true_m = path_length_m(FloorRoutePlanner(world.raster).path(*ends))
     return float(over_edges[goal] / true_m)
 
 

@@ -25,7 +25,7 @@ from lemtomap.sim.hokuyo import FIRST_STEP, LAST_STEP, SLITS
 from lemtomap.sim.raster import clearance_m
 from lemtomap.sim.simulator import Simulator
 from lemtomap.sim.tours import (
-    Tour,
+    ScriptedTour,
     TourConfig,
     base_command,
     drive,
@@ -60,16 +60,16 @@ def speed(names: list[str]) -> None:
         _profile(world, tour)
 
 
-def _drain(simulator: Simulator, tour: Tour) -> None:
+def _drain(simulator: Simulator, tour: ScriptedTour) -> None:
     for _ in drive(simulator, tour):
         simulator.kobuki.read()
         simulator.hokuyo.read()
 
 
-def _profile(world: World, tour: Tour) -> None:
+def _profile(world: World, tour: ScriptedTour) -> None:
     """Print which share of the time rays, contacts and the rest take."""
     profile = cProfile.Profile()
-    simulator, again = Simulator(world, 0), Tour(tour.path[:300])
+    simulator, again = Simulator(world, 0), ScriptedTour(tour.path[:300])
     simulator.hokuyo.write(STREAM)
     profile.enable()
     _drain(simulator, again)
@@ -111,7 +111,7 @@ def _spread(values: list[float]) -> str:
     return f"median {middle:.2f}, 10-90 % {low:.2f}-{high:.2f}"
 
 
-def _reckon(world: World, tour: Tour, seed: int) -> tuple[float, float, float]:
+def _reckon(world: World, tour: ScriptedTour, seed: int) -> tuple[float, float, float]:
     """Return the end errors of gyro odometry and of wheel odometry, and the distance, metres."""
     simulator = Simulator(world, seed)
     gyro, wheels = DeadReckoning(), DeadReckoning()

@@ -26,7 +26,7 @@ from lemtomap.se2 import (
 )
 from lemtomap.sim import worlds
 from lemtomap.sim.errors import BadWorld
-from lemtomap.sim.route import RoutePlanner, path_length_m
+from lemtomap.sim.route import FloorRoutePlanner, path_length_m
 from lemtomap.sim.world import Raster, World
 
 BEAMS = 180
@@ -65,7 +65,7 @@ QUALITIES = {
 
 def tour(world: World, length_m: float, rng: np.random.Generator) -> NDArray[np.float64]:
     """Return a way through random places of a building and back, float64 (N, 2), metres."""
-    planner = RoutePlanner(world.raster)
+    planner = FloorRoutePlanner(world.raster)
     start = (world.spawn[0], world.spawn[1])
     places = planner.places(start, SPACING_M)
     way: list[NDArray[np.float64]] = []

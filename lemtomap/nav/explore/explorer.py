@@ -19,8 +19,8 @@ from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.types import (
     Goal,
     NavOutput,
+    NavReason,
     NavState,
-    Reason,
 )
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent
@@ -148,7 +148,7 @@ class Explorer:
         if navigation is None or navigation.stamp_s <= pursuit.told_s:
             return
         if navigation.state == NavState.FAILED or now_s > pursuit.until_s:
-            barred = navigation.state == NavState.FAILED and navigation.reason == Reason.NO_ROUTE
+            barred = navigation.state == NavState.FAILED and navigation.reason == NavReason.NO_ROUTE
             self._give_up(pursuit.number, now_s, barred=barred)
             self._pursuit = None
         elif navigation.state == NavState.ARRIVED:

@@ -7,7 +7,7 @@ import numpy as np
 from lemtomap import se2
 from lemtomap.nav.config import BodyLimits
 from lemtomap.nav.kernels import motion as kernels
-from lemtomap.nav.types import Points, Sighting
+from lemtomap.nav.types import ObstacleSighting, Points
 from lemtomap.se2 import Pose
 from lemtomap.types import Twist
 
@@ -21,7 +21,7 @@ STANDING_SHARE = 0.05
 TURN_AWAY_RADPS = 0.5
 
 
-def points_now(sightings: Iterable[Sighting], T_odom_base: Pose, within_m: float = 1.6) -> Points:
+def points_now(sightings: Iterable[ObstacleSighting], T_odom_base: Pose, within_m: float = 1.6) -> Points:
     """Return the hits of the sightings, float64 (N, 2), metres, in the present base frame, near ones only."""
     parts = [
         se2.transform(se2.between(T_odom_base, sighting.T_odom_base), sighting.hits_base)

@@ -12,7 +12,7 @@ from scipy import ndimage
 from lemtomap import se2
 from lemtomap.nav.config import BodyLimits, CostmapConfig
 from lemtomap.nav.kernels import fields as kernels
-from lemtomap.nav.types import CostmapView, Points, Sighting
+from lemtomap.nav.types import CostmapView, ObstacleSighting, Points
 from lemtomap.se2 import Pose
 from lemtomap.types import GridView
 
@@ -148,7 +148,7 @@ class Costmap:
             for layer in self._live.values():
                 layer.roll(round(rows), round(cols))
 
-    def see(self, sighting: Sighting, T_grid_odom: Pose) -> None:
+    def see(self, sighting: ObstacleSighting, T_grid_odom: Pose) -> None:
         """Clear along the rays of one sighting, those without return too, and mark what they met."""
         grid = self._grid
         if grid is None:
@@ -193,7 +193,7 @@ class Costmap:
                 )
         return scanned
 
-    def _layer(self, sighting: Sighting, grid: GridView) -> LiveLayer:
+    def _layer(self, sighting: ObstacleSighting, grid: GridView) -> LiveLayer:
         layer = self._live.get(sighting.source)
         flat = sighting.floor_base is None
         decay_s = self._config.live_decay_s if flat else self._config.depth_decay_s

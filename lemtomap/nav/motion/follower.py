@@ -25,7 +25,7 @@ HELD_TURN_RAD = 0.15
 """A robot that no arc lets forward faces its way first."""
 
 
-class Motion(StrEnum):
+class FollowerState(StrEnum):
     """What the follower is doing."""
 
     TURN = "turn"
@@ -40,7 +40,7 @@ class Step:
     """One control cycle's command."""
 
     twist: Twist
-    motion: Motion
+    motion: FollowerState
 
 
 class Follower:
@@ -64,15 +64,15 @@ class Follower:
         config, body = self._config, self._config.body
         heading_off = way_heading_off(plan, T_grid_base)
         if self._must_turn(heading_off, twist):
-            return Step(turn_in_place(heading_off, twist, config), Motion.TURN)
+            return Step(turn_in_place(heading_off, twist, config), FollowerState.TURN)
         ending = None if end_m is None else Ending(end_m)
         choice = choose_twist(plan, T_grid_base, twist, ending, body, config.dwa)
         held = choice.twist is None or choice.twist.v_mps < HELD_MPS
         if held and abs(heading_off) > HELD_TURN_RAD and twist.v_mps < HELD_MPS:
-            return Step(turn_in_place(heading_off, twist, config), Motion.TURN)
+            return Step(turn_in_place(heading_off, twist, config), FollowerState.TURN)
         if choice.twist is None:
-            return Step(approach(twist, Twist(0.0, 0.0), body, config.period_s), Motion.STUCK)
-        return Step(approach(twist, choice.twist, body, config.period_s), Motion.DRIVE)
+            return Step(approach(twist, Twist(0.0, 0.0), body, config.period_s), FollowerState.STUCK)
+        return Step(approach(twist, choice.twist, body, config.period_s), FollowerState.DRIVE)
 
     def at_goal(self, end_m: float, tolerance_m: float) -> bool:
         """Tell whether the spot is reached; then turning may stray by as much again."""
@@ -84,10 +84,10 @@ class Follower:
         config = self._config
         off = 0.0 if yaw_grid_rad is None else float(wrap_angle(yaw_grid_rad - T_grid_base[2]))
         if abs(off) > config.yaw_tolerance_rad:
-            return Step(turn_in_place(off, twist, config), Motion.TURN)
+            return Step(turn_in_place(off, twist, config), FollowerState.TURN)
         slower = approach(twist, Twist(0.0, 0.0), config.body, config.period_s)
         resting = slower.v_mps == 0.0 and slower.w_radps == 0.0
-        return Step(slower, Motion.THERE if resting else Motion.DRIVE)
+        return Step(slower, FollowerState.THERE if resting else FollowerState.DRIVE)
 
     def _must_turn(self, heading_off: float, twist: Twist) -> bool:
         config = self._config

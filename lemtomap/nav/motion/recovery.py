@@ -12,7 +12,7 @@ from lemtomap.se2 import Pose
 from lemtomap.types import Twist
 
 
-class Rung(IntEnum):
+class RecoveryBehaviour(IntEnum):
     """The ladder, in order."""
 
     REPLAN = 0
@@ -78,7 +78,7 @@ class ProgressWatch:
         return self._rises < self._config.longer_ways and made_good_m >= self._config.longer_way_m
 
 
-class WayBack:
+class BreadcrumbTrail:
     """The last metres driven, to go back along them."""
 
     def __init__(self, length_m: float = 2.0, step_m: float = 0.04) -> None:
@@ -113,7 +113,7 @@ class WayBack:
 
 @dataclass(slots=True)
 class _Running:
-    rung: Rung
+    rung: RecoveryBehaviour
     until_s: float
     limit_m: float
     T_odom_begun: Pose
@@ -121,12 +121,12 @@ class _Running:
     last_yaw_rad: float = 0.0
 
 
-class Ladder:
+class RecoverySequence:
     """Climbs one rung each time the robot is stuck again; begins at the foot after progress."""
 
     def __init__(self, config: RecoveryConfig) -> None:
         self._config = config
-        self._next = Rung.REPLAN
+        self._next = RecoveryBehaviour.REPLAN
         self._rounds = 0
         self._gained_m = 0.0
         self._running: _Running | None = None
@@ -148,39 +148,43 @@ class Ladder:
 
     def reset(self) -> None:
         """Start from the foot for a new goal."""
-        self._next, self._rounds, self._running = Rung.REPLAN, 0, None
+        self._next, self._rounds, self._running = RecoveryBehaviour.REPLAN, 0, None
 
     def relax(self, gained_m: float) -> None:
         """Start from the foot after progress; only much of it lets past failures be forgotten."""
         if self._running is not None or gained_m == 0.0:
             return
-        self._next = Rung.REPLAN
+        self._next = RecoveryBehaviour.REPLAN
         self._gained_m += gained_m
         if self._gained_m >= self._config.forgive_m:
             self._rounds = 0
 
-    def climb(self, T_odom_base: Pose, now_s: float) -> Rung:
+    def climb(self, T_odom_base: Pose, now_s: float) -> RecoveryBehaviour:
         """Take the next rung; turning and backing off then run through `step`."""
         rung, self._gained_m = self._next, 0.0
-        self._next = Rung((rung + 1) % len(Rung))
-        if rung == Rung.BLOCK:
+        self._next = RecoveryBehaviour((rung + 1) % len(RecoveryBehaviour))
+        if rung == RecoveryBehaviour.BLOCK:
             self._rounds += 1
-        elif rung == Rung.TURN:
+        elif rung == RecoveryBehaviour.TURN:
             self._begin(rung, self._config.turn_s, np.inf, T_odom_base, now_s)
-        elif rung == Rung.BACK_OFF:
+        elif rung == RecoveryBehaviour.BACK_OFF:
             self.back_off(T_odom_base, now_s, self._config.back_off_m)
         return rung
 
     def back_off(self, T_odom_base: Pose, now_s: float, limit_m: float) -> None:
         """Go back now, whatever rung is next (after a bump)."""
-        self._begin(Rung.BACK_OFF, self._config.back_off_s, limit_m, T_odom_base, now_s)
+        self._begin(RecoveryBehaviour.BACK_OFF, self._config.back_off_s, limit_m, T_odom_base, now_s)
 
-    def _begin(self, rung: Rung, time_s: float, limit_m: float, T_odom_base: Pose, now_s: float) -> None:
+    def _begin(
+        self, rung: RecoveryBehaviour, time_s: float, limit_m: float, T_odom_base: Pose, now_s: float
+    ) -> None:
         self._running = _Running(
             rung, now_s + time_s, limit_m, np.array(T_odom_base), 0.0, float(T_odom_base[2])
         )
 
-    def step(self, T_odom_base: Pose, way_back: WayBack, now_s: float, *, room_behind: bool) -> Twist | None:
+    def step(
+        self, T_odom_base: Pose, way_back: BreadcrumbTrail, now_s: float, *, room_behind: bool
+    ) -> Twist | None:
         """Return the twist of the rung under way, or None when it has ended."""
         run = self._running
         if run is None:
@@ -189,13 +193,13 @@ class Ladder:
         run.last_yaw_rad = float(T_odom_base[2])
         moved_m = float(np.hypot(*(T_odom_base - run.T_odom_begun)[:2]))
         over = now_s >= run.until_s or moved_m >= run.limit_m
-        if run.rung == Rung.TURN and run.turned_rad >= 2.0 * np.pi:
+        if run.rung == RecoveryBehaviour.TURN and run.turned_rad >= 2.0 * np.pi:
             over = True
-        if run.rung == Rung.BACK_OFF and not room_behind:
+        if run.rung == RecoveryBehaviour.BACK_OFF and not room_behind:
             over = True
         if over:
             self._running = None
             return None
-        if run.rung == Rung.TURN:
+        if run.rung == RecoveryBehaviour.TURN:
             return Twist(0.0, self._config.turn_radps)
         return way_back.twist_back(T_odom_base, self._config.back_off_mps)

@@ -33,7 +33,7 @@ SHUT_IN_M2 = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class CycleInput:
     """What one control cycle knows."""
 
     map_view: MapView
@@ -54,7 +54,7 @@ class Closing:
     link: Link
 
 
-class WayKeeper:
+class RouteKeeper:
     """Holds the route to one goal and which edges are closed; closed edges outlive the goal."""
 
     def __init__(self, config: NavConfig) -> None:
@@ -78,7 +78,7 @@ class WayKeeper:
         self.barriers.reset()
         self.barred_s, self._retried, self._instead, self._sought_s = None, False, None, -np.inf
 
-    def keep(self, goal: Goal, moment: Moment) -> Route:
+    def keep(self, goal: Goal, moment: CycleInput) -> Route:
         """Return the route from the associated node, planned anew only when the map or the way changed.
 
         Raises NoRoute with the reason.
@@ -93,7 +93,7 @@ class WayKeeper:
         self.route = self._plan_from(here, goal, moment)
         return self.route
 
-    def begin_elsewhere(self, goal: Goal, reach: Reach, moment: Moment) -> bool:
+    def begin_elsewhere(self, goal: Goal, reach: Reach, moment: CycleInput) -> bool:
         """Plan from another node that the window shows a way to, if the associated one has none.
 
         What was bumped into may stand on a node: all its edges are cut, though there is room to pass.
@@ -112,13 +112,13 @@ class WayKeeper:
             return True
         return False
 
-    def _plan_from(self, node_id: int, goal: Goal, moment: Moment) -> Route:
+    def _plan_from(self, node_id: int, goal: Goal, moment: CycleInput) -> Route:
         view = replace(moment.map_view, associated_id=node_id)
         self._version = moment.graph.version
         return self._planner.plan(moment.graph, view, goal.node_id, moment.now_s, self._closed_s)
 
     def check(
-        self, goal: Goal, target: Target | None, plan: MetricPlan | None, reach: Reach, moment: Moment
+        self, goal: Goal, target: Target | None, plan: MetricPlan | None, reach: Reach, moment: CycleInput
     ) -> tuple[float, float] | None:
         """Open edges seen to be free; close those a standing barrier cuts, once it is to be believed.
 
@@ -148,7 +148,7 @@ class WayKeeper:
         self._close([on_route, *links_cut(moment.map_view, reach, barrier, BORDER_M)], moment)
         return barrier.p_middle_grid
 
-    def reopen(self, reach: Reach, moment: Moment) -> bool:
+    def reopen(self, reach: Reach, moment: CycleInput) -> bool:
         """Open closed edges that are seen to be free; tell whether there were any.
 
         One that proved closed again and again, though it had been seen free, waits for its time.
@@ -158,7 +158,7 @@ class WayKeeper:
         self._open(links, moment)
         return bool(links)
 
-    def retry(self, moment: Moment) -> bool:
+    def retry(self, moment: CycleInput) -> bool:
         """Open, once for a goal, what was closed a while ago: a second look is better than to refuse.
 
         False when there is nothing of the kind.
@@ -175,14 +175,14 @@ class WayKeeper:
         self._open(old, moment)
         return True
 
-    def _open(self, links: Sequence[Link], moment: Moment) -> None:
+    def _open(self, links: Sequence[Link], moment: CycleInput) -> None:
         """Plan over these edges again, and tell the map."""
         for edge_id, a, b in links:
             del self._closed_s[edge_id]
             moment.events.append(EdgeBlocked(a, b, 0.0))
             self.barred_s = moment.now_s  # the map will hear of it in a moment
 
-    def close_next(self, moment: Moment) -> bool:
+    def close_next(self, moment: CycleInput) -> bool:
         """Close the first edge of the route; False when there is none."""
         route = self.route
         if route is None or not route.edges:
@@ -196,7 +196,7 @@ class WayKeeper:
             if edge.other_id == driven.to_id:
                 self._closings.pop(edge.edge_id, None)
 
-    def _rule_out(self, route: Route, index: int, moment: Moment) -> None:
+    def _rule_out(self, route: Route, index: int, moment: CycleInput) -> None:
         """Close a closure that the window shows to lead through something: it never was a way."""
         edge_id, until_s = route.edges[index].edge_id, moment.now_s + self._config.recovery.block_longest_s
         self._closed_s[edge_id] = until_s
@@ -204,7 +204,7 @@ class WayKeeper:
         self.route = None
         self.barriers.reset()
 
-    def _close(self, links: Sequence[Link], moment: Moment) -> None:
+    def _close(self, links: Sequence[Link], moment: CycleInput) -> None:
         """Plan around these edges from now on, and tell the map."""
         longest_s = self._config.recovery.block_longest_s
         self._closings = {e: c for e, c in self._closings.items() if moment.now_s - c.stamp_s < longest_s}

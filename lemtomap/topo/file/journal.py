@@ -30,7 +30,7 @@ KEPT_EDITS = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class JournalEntry:
     """One edit that can be undone."""
 
     entry_id: int
@@ -72,9 +72,9 @@ def recorded(store: TopoStore, what: str, stamp_s: float = 0.0) -> Iterator[Reco
         store.write("DELETE FROM journal WHERE id <= (SELECT max(id) FROM journal) - ?", (KEPT_EDITS,))
 
 
-def entries(store: TopoStore) -> list[Entry]:
+def entries(store: TopoStore) -> list[JournalEntry]:
     """Return the edits that can be undone, newest first."""
-    return [Entry(*row) for row in store.query("SELECT id, stamp, what FROM journal ORDER BY id DESC")]
+    return [JournalEntry(*row) for row in store.query("SELECT id, stamp, what FROM journal ORDER BY id DESC")]
 
 
 def undo(store: TopoStore) -> str | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from lemtomap.se2 import Pose, compose
 from lemtomap.topo.file.store import TopoStore
-from lemtomap.topo.graph import Edge, Leg, Node
+from lemtomap.topo.graph import DirectedEdge, Edge, Node
 
 LEGS_PER_NODE = 4  # legs are kept of so many times the nodes: in plain numbers they are small
 
@@ -37,7 +37,7 @@ class PagedGraph:
         self._edges: OrderedDict[int, tuple[Edge, ...]] = OrderedDict()
         self._ways: dict[int, list[tuple[int, float, Edge]]] = {}
         """Other end, length and edge, of nodes whose edges are in memory and were asked for their ways."""
-        self._legs: OrderedDict[int, tuple[Leg, ...]] = OrderedDict()
+        self._legs: OrderedDict[int, tuple[DirectedEdge, ...]] = OrderedDict()
 
     def node(self, node_id: int) -> Node:
         """Return a node. Raises KeyError for one the map does not have."""
@@ -59,11 +59,11 @@ class PagedGraph:
             self._edges.move_to_end(node_id)
         return edges
 
-    def legs_of(self, node_id: int) -> Sequence[Leg]:
+    def legs_of(self, node_id: int) -> Sequence[DirectedEdge]:
         """Return the edges at a node as seen from it, in the order of `edges_of`."""
         legs = self._legs.get(node_id)
         if legs is None:
-            legs = tuple(Leg.along(edge, node_id) for edge in self.edges_of(node_id))
+            legs = tuple(DirectedEdge.along(edge, node_id) for edge in self.edges_of(node_id))
             self._legs[node_id] = legs
             if len(self._legs) > LEGS_PER_NODE * self._capacity:
                 self._legs.popitem(last=False)

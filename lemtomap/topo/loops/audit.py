@@ -13,9 +13,9 @@ import numpy as np
 
 from lemtomap.se2 import Pose, adjoint, wrap_angle
 from lemtomap.topo.file.paging import PagedGraph, Reached
-from lemtomap.topo.graph import Covariance, Edge, Leg
+from lemtomap.topo.graph import Covariance, DirectedEdge, Edge
 from lemtomap.topo.loops.config import AuditConfig, GateConfig
-from lemtomap.topo.loops.outlook import Expected, LegSource, Outlook
+from lemtomap.topo.loops.outlook import Expected, GraphUncertainty, LegSource
 from lemtomap.types import EdgeType
 
 
@@ -41,7 +41,7 @@ class Without:
     graph: LegSource
     edge_ids: frozenset[int]
 
-    def legs_of(self, node_id: int) -> Sequence[Leg]:
+    def legs_of(self, node_id: int) -> Sequence[DirectedEdge]:
         """Return the edges at a node as seen from it."""
         return [leg for leg in self.graph.legs_of(node_id) if leg.edge_id not in self.edge_ids]
 
@@ -51,7 +51,7 @@ class _Round:
     """The way round one trial's closures, while it is looked for."""
 
     trial: Trial
-    outlook: Outlook
+    outlook: GraphUncertainty
 
 
 @dataclass(slots=True)
@@ -112,7 +112,7 @@ class Audit:
             trial = self._due.popleft()
             edge_ids = frozenset(edge.edge_id for edge in trial.edges)
             source_id = trial.edges[0].source_id
-            self._round = _Round(trial, Outlook(Without(self.graph, edge_ids), source_id, self.gate))
+            self._round = _Round(trial, GraphUncertainty(Without(self.graph, edge_ids), source_id, self.gate))
         outlook, edge = self._round.outlook, self._round.trial.edges[0]
         done = outlook.advance(nodes)
         if edge.target_id in outlook:
@@ -143,7 +143,7 @@ class Audit:
     def _trials(self) -> list[Trial]:
         return list({id(trial): trial for trial in self._trial_of.values()}.values())
 
-    def _judge(self, trial: Trial, edge: Edge, expected: Expected, outlook: Outlook) -> None:
+    def _judge(self, trial: Trial, edge: Edge, expected: Expected, outlook: GraphUncertainty) -> None:
         """Hold a closure against the way round it; who is wrong when they differ, the least supported is."""
         others = self._on_way(outlook, edge.target_id)
         if _chi2(edge, expected) <= self.config.limit_chi2:
@@ -155,7 +155,7 @@ class Audit:
         weakest.contradicted += self.config.least_against if others else 1_000
         self._accused = True
 
-    def _on_way(self, outlook: Outlook, node_id: int) -> list[Trial]:
+    def _on_way(self, outlook: GraphUncertainty, node_id: int) -> list[Trial]:
         """Return the trials with a closure on the way the outlook went to a node."""
         found: dict[int, Trial] = {}
         for before_id, after_id in outlook.way(node_id):

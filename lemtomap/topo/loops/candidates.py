@@ -14,7 +14,7 @@ from lemtomap.se2 import adjoint, between, compose
 from lemtomap.topo.loops.config import GateConfig, LoopConfig
 from lemtomap.topo.loops.descriptor import describe, distances
 from lemtomap.topo.loops.matcher import SearchBox
-from lemtomap.topo.loops.outlook import Outlook
+from lemtomap.topo.loops.outlook import GraphUncertainty
 from lemtomap.topo.loops.places import PlaceBook
 from lemtomap.topo.recognition import Situation
 
@@ -22,7 +22,7 @@ USUAL_UNLIKENESS = 45.0  # descriptor distance of two visits to one place
 
 
 def ranked(
-    outlook: Outlook,
+    outlook: GraphUncertainty,
     situation: Situation,
     points_grid: NDArray[np.float64],
     places: PlaceBook,
@@ -51,7 +51,7 @@ def ranked(
 
 
 def spaced(
-    outlook: Outlook,
+    outlook: GraphUncertainty,
     here_id: int,
     node_ids: Sequence[int],
     count: int,
@@ -76,13 +76,15 @@ def spaced(
     return chosen
 
 
-def way_m(outlook: Outlook | None, here_id: int, node_id: int) -> float:
+def way_m(outlook: GraphUncertainty | None, here_id: int, node_id: int) -> float:
     """Return the way over edges to a node; a short one means that it lies in the window anyway."""
     seen = None if outlook is None else outlook.between(here_id, node_id)
     return np.inf if seen is None else seen.way_m
 
 
-def search_box(outlook: Outlook, situation: Situation, node_id: int, gate: GateConfig) -> SearchBox | None:
+def search_box(
+    outlook: GraphUncertainty, situation: Situation, node_id: int, gate: GateConfig
+) -> SearchBox | None:
     """Return where to search a node in the window: where it is expected, as wide as that is doubtful.
 
     Where that is wider than the window, what of it lies around the robot; None when hardly anything does.

@@ -25,12 +25,12 @@ from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Hypotheses, Hypothesis
 from lemtomap.topo.loops.judge import Judge
 from lemtomap.topo.loops.matcher import (
-    Match,
     Reference,
     Search,
     SearchBox,
+    SearchMatch,
 )
-from lemtomap.topo.loops.outlook import Outlook
+from lemtomap.topo.loops.outlook import GraphUncertainty
 from lemtomap.topo.loops.places import PlaceBook
 from lemtomap.topo.recognition import (
     Closed,
@@ -57,8 +57,8 @@ class LoopCloser:
         self.searched = 0
         self.work = 0
         self.confirmed: list[Confirmed] = []
-        self._outlook: Outlook | None = None
-        self._counted: Outlook | None = None
+        self._outlook: GraphUncertainty | None = None
+        self._counted: GraphUncertainty | None = None
         self._apart = False
         self._since_outlook = 0
         self._tasks: deque[Task] = deque()
@@ -163,7 +163,7 @@ class LoopCloser:
         self._since_outlook += 1
         outlook = self._outlook
         if outlook is None or self._since_outlook > self.config.gate.renew_after:
-            self._outlook = Outlook(self.graph, here_id, self.config.gate)
+            self._outlook = GraphUncertainty(self.graph, here_id, self.config.gate)
             self._since_outlook = 0
             self._outlook.advance(200)
         elif here_id not in outlook:
@@ -191,7 +191,7 @@ class LoopCloser:
         return chosen
 
     def _ranked(
-        self, outlook: Outlook, situation: Situation, points_grid: NDArray[np.float64]
+        self, outlook: GraphUncertainty, situation: Situation, points_grid: NDArray[np.float64]
     ) -> list[list[int]]:
         """Return the known places on this level that may lie here: sure ones, and unsure ones."""
         level = self.graph.node(situation.here_id).level
@@ -270,7 +270,7 @@ class LoopCloser:
         if task.hearing_for is not None and not any(t.hearing_for is task.hearing_for for t in self._tasks):
             task.hearing_for.heard = True
 
-    def _is_news(self, match: Match, task: Task) -> bool:
+    def _is_news(self, match: SearchMatch, task: Task) -> bool:
         """Tell whether a search found a place where the mapper does not have it anyway."""
         return (
             self._judge.is_sighting(match, task)
@@ -278,7 +278,7 @@ class LoopCloser:
             and not self._judge.is_alias(match, task)
         )
 
-    def _testify(self, task: Task, match: Match | None) -> None:
+    def _testify(self, task: Task, match: SearchMatch | None) -> None:
         """Let a place speak for or against the closures by which it must be here; silent when unsure."""
         if match is not None and self._judge.is_sighting(match, task):
             if match.weakest >= self.config.corridor:
@@ -288,7 +288,7 @@ class LoopCloser:
                 self.log(f"witness against {task.situation.here_id}~{task.node_id} {match}")
             self.audit.hear(task.on_trial, agrees=False)
 
-    def _confirms(self, match: Match, task: Task) -> bool:
+    def _confirms(self, match: SearchMatch, task: Task) -> bool:
         """Take a search for the associated node that found it where it was thought to be."""
         situation = task.situation
         if task.node_id != situation.here_id:

@@ -6,7 +6,7 @@ from lemtomap.errors import BadSetting
 
 
 @dataclass(frozen=True, slots=True)
-class MatchConfig:
+class SearchConfig:
     """Correlative search and fine alignment (Olson 2009; Hess et al. 2016)."""
 
     cell_m: float = 0.1  # search cell: two window cells; the fine alignment does the rest
@@ -68,7 +68,7 @@ class GateConfig:
 class LocatorConfig:
     """When a robot that does not know where it is has found out."""
 
-    match: MatchConfig = field(default_factory=lambda: MatchConfig(least_score=0.6))
+    match: SearchConfig = field(default_factory=lambda: SearchConfig(least_score=0.6))
     """Of what is seen in a stored place: nearly all of it is there, even with a third of the chairs moved."""
     first_score: float = (
         0.75  # the first time round only what fits at a glance is looked for: three times faster
@@ -131,7 +131,7 @@ class AuditConfig:
 class LoopConfig:
     """When a place is believed to be one known before."""
 
-    match: MatchConfig = field(default_factory=MatchConfig)
+    match: SearchConfig = field(default_factory=SearchConfig)
     gate: GateConfig = field(default_factory=GateConfig)
     locator: LocatorConfig = field(default_factory=LocatorConfig)
     audit: AuditConfig = field(default_factory=AuditConfig)

@@ -13,7 +13,7 @@ import numpy as np
 from lemtomap.se2 import Pose, between, compose
 from lemtomap.topo.graph import Covariance
 from lemtomap.topo.loops.config import LoopConfig
-from lemtomap.topo.loops.matcher import Match
+from lemtomap.topo.loops.matcher import SearchMatch
 from lemtomap.topo.recognition import Found
 
 Around = Callable[[int], Mapping[int, Pose]]
@@ -25,7 +25,7 @@ class Sighting:
     """A known node found in the window, and where the robot's own map was then."""
 
     node_id: int
-    match: Match
+    match: SearchMatch
     here_id: int
     """The node the robot was at."""
     T_here_node: Pose

@@ -9,9 +9,9 @@ from lemtomap.topo.graph import Covariance, chain_covariance, reversed_covarianc
 from lemtomap.topo.loops.cases import Task
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Sighting
-from lemtomap.topo.loops.matcher import Match
+from lemtomap.topo.loops.matcher import SearchMatch
 from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
-from lemtomap.topo.loops.places import Company, PlaceBook
+from lemtomap.topo.loops.places import LocalSubmap, PlaceBook
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,13 +21,13 @@ class Judge:
     config: LoopConfig
     places: PlaceBook
 
-    def company(self, task: Task) -> Company | None:
+    def company(self, task: Task) -> LocalSubmap | None:
         """Return what is searched: a place with its neighbours; one on trial alone, who knows whose they
         are.
         """
         return self.places.alone(task.node_id) if task.on_trial else self.places.company(task.node_id)
 
-    def is_sighting(self, match: Match, task: Task) -> bool:
+    def is_sighting(self, match: SearchMatch, task: Task) -> bool:
         """Tell whether a place was found: most of it seen, little against it, no other pose as good."""
         config = self.config
         company = self.company(task)
@@ -42,7 +42,7 @@ class Judge:
             and explained >= config.points
         )
 
-    def is_alias(self, match: Match, task: Task) -> bool:
+    def is_alias(self, match: SearchMatch, task: Task) -> bool:
         """Tell whether a place found elsewhere than the graph has it only resembles what is known there.
 
         A corridor of like rooms shows each place again a door further on. Where the robot's own node is not
@@ -68,7 +68,7 @@ class Judge:
         own, alien = told_apart(around, found, thought)
         return own < config.alias_points + alien
 
-    def sighting(self, task: Task, match: Match) -> Sighting:
+    def sighting(self, task: Task, match: SearchMatch) -> Sighting:
         """Relate the node found to the node the robot was at."""
         here = task.situation
         T_here_node = between(here.T_grid_here, match.T_grid_place)
@@ -89,13 +89,13 @@ class Judge:
             self._evidence(task, match),
         )
 
-    def _along(self, match: Match) -> Covariance:
+    def _along(self, match: SearchMatch) -> Covariance:
         """Return what a match in a corridor is unsure of along it, beyond its own figures."""
         along = np.zeros(3)
         along[:2] = np.linalg.eigh(match.covariance[:2, :2])[1][:, -1]
         return np.asarray(self.config.corridor_sigma_m**2 * np.outer(along, along))
 
-    def _evidence(self, task: Task, match: Match) -> float:
+    def _evidence(self, task: Task, match: SearchMatch) -> float:
         """Return how much a sighting counts: less for each reason to think that it may be chance.
 
         Along a corridor a place is told by a few door frames, and they repeat; the next metre of travel
@@ -117,5 +117,5 @@ class Judge:
         return match.known >= self.config.known and match.contradicted >= self.config.refuted
 
 
-def _gap_m(T_grid_node: Pose, match: Match) -> float:
+def _gap_m(T_grid_node: Pose, match: SearchMatch) -> float:
     return float(np.hypot(*(T_grid_node[:2] - match.T_grid_place[:2])))

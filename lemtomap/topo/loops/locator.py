@@ -30,13 +30,13 @@ from lemtomap.topo.loops.descriptor import describe
 from lemtomap.topo.loops.index import PlaceIndex
 from lemtomap.topo.loops.lineup import LineUp
 from lemtomap.topo.loops.matcher import (
-    Match,
     Reference,
     Search,
     SearchBox,
+    SearchMatch,
 )
 from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
-from lemtomap.topo.loops.places import Company, PlaceBook, kept
+from lemtomap.topo.loops.places import LocalSubmap, PlaceBook, kept
 from lemtomap.topo.recognition import Found, Situation
 from lemtomap.types import GridView
 
@@ -46,7 +46,7 @@ PICTURES_KEPT = 16  # 0.3 MB each
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class WindowSnapshot:
     """What the robot sees at one moment."""
 
     T_grid_base: Pose
@@ -76,7 +76,7 @@ class Guess:
     T_grid_node: Pose
     fits: list[float] = field(default_factory=list)
     """How well each check bore it out, 1 for a perfect fit."""
-    match: Match | None = None
+    match: SearchMatch | None = None
     from_m: float = 0.0
     """Way of the robot at the first check."""
     from_rad: float = 0.0
@@ -113,7 +113,7 @@ class Locator:
             or turned_rad - seen.turned_rad >= self.config.look_rad
         )
 
-    def look(self, look: Look) -> None:
+    def look(self, look: WindowSnapshot) -> None:
         """Check all guesses against what is seen now, and line up the places to search."""
         self._view = view = _View(look, self._loops, self.config)
         for guess in self.guesses:
@@ -161,7 +161,7 @@ class Locator:
         self.searched += 1
         return self.config.picture_work
 
-    def _picture(self, company: Company) -> Reference:
+    def _picture(self, company: LocalSubmap) -> Reference:
         """Return a stored place as the fixed side of a search: walls, and nothing known of the rest."""
         return kept(
             self._pictures, company.node_id, PICTURES_KEPT, lambda _: picture_of(company, self.config.match)
@@ -290,7 +290,7 @@ class Locator:
         company = self.places.company(guess.node_id)
         return None if company is None else Placed(self._picture(company), guess.T_grid_node)
 
-    def _is_sound(self, guess: Guess, match: Match, view: "_View", weakest: float) -> bool:
+    def _is_sound(self, guess: Guess, match: SearchMatch, view: "_View", weakest: float) -> bool:
         """Tell whether a guess has borne every check of late, on walls that hold it in every direction.
 
         weakest: share of the strongest direction's information on the weakest, at least. Along a corridor
@@ -307,7 +307,7 @@ class Locator:
 class _View:
     """One look, made ready: the window as a reference, and what stands around the robot in its frame."""
 
-    def __init__(self, look: Look, loops: LoopConfig, config: LocatorConfig) -> None:
+    def __init__(self, look: WindowSnapshot, loops: LoopConfig, config: LocatorConfig) -> None:
         self.look = look
         self.reference = Reference(look.grid, look.points_grid, loops.match)
         points = transform(inverse(look.T_grid_base), look.points_grid)

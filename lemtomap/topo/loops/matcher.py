@@ -21,7 +21,7 @@ from lemtomap.se2 import (
 from lemtomap.topo.graph import sure_of
 from lemtomap.topo.kernels import fitting, lines
 from lemtomap.topo.kernels import search as kernels
-from lemtomap.topo.loops.config import MatchConfig
+from lemtomap.topo.loops.config import SearchConfig
 from lemtomap.types import GridView
 
 Points = NDArray[np.float64]
@@ -55,7 +55,7 @@ class SearchBox:
 
 
 @dataclass(frozen=True, slots=True)
-class Match:
+class SearchMatch:
     """A place found in the window."""
 
     T_grid_place: Pose
@@ -90,7 +90,7 @@ class Reference:
     points_grid: averaged hits, float (N, 2), metres, grid frame: finer than the cells, for the alignment.
     """
 
-    def __init__(self, grid: GridView, points_grid: Points, config: MatchConfig) -> None:
+    def __init__(self, grid: GridView, points_grid: Points, config: SearchConfig) -> None:
         self.config = config
         self.grid = grid
         block = max(1, round(config.cell_m / grid.resolution_m))
@@ -134,7 +134,7 @@ class Reference:
 
     def refine(
         self, points_place: Points, T_grid_place: Pose, *, score: float = 1.0, rival: float = 0.0
-    ) -> Match:
+    ) -> SearchMatch:
         """Align a place from a pose that is right within a search cell or two, and measure the fit."""
         config, grid = self.config, self.grid
         origin_x, origin_y = grid.origin_m
@@ -155,7 +155,7 @@ class Reference:
             points_place, found, self.field, origin_x, origin_y, self.cell_m
         )
         known = max(1, hit + against)
-        return Match(
+        return SearchMatch(
             T_grid_place=found,
             covariance=_covariance(info, found[2], residual_m, config),
             explained=hit / known,
@@ -178,7 +178,7 @@ class Search:
     least_score: float = 0.0
     """Nothing below is looked for; at least what the settings say."""
     progress: Progress = Progress.SEARCHING
-    match: Match | None = None
+    match: SearchMatch | None = None
     work: int = 0
     rival: Pose | None = None
     """The best clearly different pose, to a search cell; None when nothing near as good was found."""
@@ -288,7 +288,7 @@ class Search:
         self.match = self.reference.refine(self.points_place, T_grid_place, score=score, rival=rival)
 
 
-def _falloff(config: MatchConfig, cell_m: float) -> NDArray[np.int16]:
+def _falloff(config: SearchConfig, cell_m: float) -> NDArray[np.int16]:
     half = max(1, int(np.ceil(1.5 * config.spread_m / cell_m)))
     offsets = np.arange(-half, half + 1) * cell_m
     squares = offsets[:, None] ** 2 + offsets[None, :] ** 2
@@ -298,7 +298,7 @@ def _falloff(config: MatchConfig, cell_m: float) -> NDArray[np.int16]:
 
 
 def _covariance(
-    info: NDArray[np.float64], yaw_rad: float, residual_m: float, config: MatchConfig
+    info: NDArray[np.float64], yaw_rad: float, residual_m: float, config: SearchConfig
 ) -> NDArray[np.float64]:
     """Return the covariance in the place's own axes from the normal matrix in the grid's."""
     cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between
-from lemtomap.topo.graph import Leg
+from lemtomap.topo.graph import DirectedEdge
 from lemtomap.topo.loops.config import GateConfig
 
 # Columns of a node's sums: translation variance, heading variance, and that times the place of each edge
@@ -27,7 +27,7 @@ Sums = NDArray[np.float64]
 class LegSource(Protocol):
     """What the outlook reads of a graph."""
 
-    def legs_of(self, node_id: int) -> Sequence[Leg]:
+    def legs_of(self, node_id: int) -> Sequence[DirectedEdge]:
         """Return the edges at a node as seen from it."""
         ...
 
@@ -56,7 +56,7 @@ class _Known(NamedTuple):
 _START = _Known(0.0, 0.0, 0.0, 0.0, 0, 0, (0.0,) * 7)
 
 
-class Outlook:
+class GraphUncertainty:
     """Expected poses of the nodes around one anchor node, found a slice at a time, surest first."""
 
     def __init__(self, graph: LegSource, anchor_id: int, config: GateConfig) -> None:
@@ -64,7 +64,7 @@ class Outlook:
         self._graph = graph
         self._config = config
         self._known: dict[int, _Known] = {}
-        self._queue: list[tuple[float, int, int, int, Leg | None]] = [(0.0, 0, anchor_id, 0, None)]
+        self._queue: list[tuple[float, int, int, int, DirectedEdge | None]] = [(0.0, 0, anchor_id, 0, None)]
         """Doubt of the way, running number, node, the node before it and the edge from there."""
         self._pushed = 0
         self._ids: list[int] = []
@@ -116,16 +116,16 @@ class Outlook:
                 doubt = cost + self._doubt(leg)
                 heapq.heappush(self._queue, (doubt, self._pushed, leg.other_id, node_id, leg))
 
-    def _doubt(self, leg: Leg) -> float:
+    def _doubt(self, leg: DirectedEdge) -> float:
         """Return what crossing an edge costs: well measured ways win."""
         shift_var, turn_var = self._variances(leg)
         return shift_var + self._config.arm_m**2 * turn_var
 
-    def _variances(self, leg: Leg) -> tuple[float, float]:
+    def _variances(self, leg: DirectedEdge) -> tuple[float, float]:
         config, (_, _, _, _, _, length, shift_var, turn_var) = self._config, leg
         return shift_var + config.shift_var_per_m * length, turn_var + config.turn_var_per_m * length
 
-    def _after(self, known: _Known, leg: Leg, node_id: int) -> _Known:
+    def _after(self, known: _Known, leg: DirectedEdge, node_id: int) -> _Known:
         """Return where an edge from a node reached leads."""
         _, _, dx, dy, turn, length, _, _ = leg
         shift_var, turn_var = self._variances(leg)

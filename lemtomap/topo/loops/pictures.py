@@ -6,9 +6,9 @@ import numpy as np
 
 from lemtomap.se2 import Pose, inverse
 from lemtomap.topo.kernels import fitting
-from lemtomap.topo.loops.config import MatchConfig
+from lemtomap.topo.loops.config import SearchConfig
 from lemtomap.topo.loops.matcher import Points, Reference
-from lemtomap.topo.loops.places import RASTER_M, Company
+from lemtomap.topo.loops.places import RASTER_M, LocalSubmap
 from lemtomap.types import GridView
 
 BORDER_CELLS = 4  # so that a point beside a place falls off its walls
@@ -22,7 +22,7 @@ class Placed:
     T_grid_node: Pose
 
 
-def picture_of(company: Company, config: MatchConfig) -> Reference:
+def picture_of(company: LocalSubmap, config: SearchConfig) -> Reference:
     """Return a stored place as the fixed side of a search: walls, and nothing known of the rest."""
     cells = np.floor(company.points_node / RASTER_M).astype(np.int64)
     low = cells.min(axis=0) - BORDER_CELLS

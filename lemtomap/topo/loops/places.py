@@ -22,7 +22,7 @@ DESCRIPTORS_KEPT = 8192  # a fifth of a kilobyte each
 
 
 @dataclass(frozen=True, slots=True)
-class Company:
+class LocalSubmap:
     """A place with its neighbours, all in the frame of its node."""
 
     node_id: int
@@ -41,14 +41,14 @@ class PlaceBook:
         self._search_points = search_points
         self._kept = kept
         self._points: OrderedDict[int, Points | None] = OrderedDict()
-        self._companies: OrderedDict[int, Company | None] = OrderedDict()
+        self._companies: OrderedDict[int, LocalSubmap | None] = OrderedDict()
         self._descriptors: OrderedDict[int, NDArray[np.float32] | None] = OrderedDict()
 
     def points(self, node_id: int) -> Points | None:
         """Return a node's obstacle points in its own frame, None when it has no localisation data."""
         return kept(self._points, node_id, self._kept, self._decode)
 
-    def company(self, node_id: int) -> Company | None:
+    def company(self, node_id: int) -> LocalSubmap | None:
         """Return a node's place joined with those around it; None when the node itself has none."""
         return kept(self._companies, node_id, COMPANIES_KEPT, self._join)
 
@@ -60,10 +60,10 @@ class PlaceBook:
         """Tell whether a node has localisation data to be known again by."""
         return self.descriptor(node_id) is not None
 
-    def alone(self, node_id: int) -> Company | None:
+    def alone(self, node_id: int) -> LocalSubmap | None:
         """Return a node's place without its neighbours; None when it has none."""
         own = self.points(node_id)
-        return None if own is None or len(own) == 0 else Company(node_id, own, self._chosen(own))
+        return None if own is None or len(own) == 0 else LocalSubmap(node_id, own, self._chosen(own))
 
     def forget(self, *node_ids: int) -> None:
         """Read these nodes afresh (and all companies, which they may belong to)."""
@@ -84,7 +84,7 @@ class PlaceBook:
         place = self._graph.store.place(node_id)
         return None if place is None or len(place.descriptor) != BYTES else unpack(place.descriptor)[0]
 
-    def _join(self, node_id: int) -> Company | None:
+    def _join(self, node_id: int) -> LocalSubmap | None:
         own = self.points(node_id)
         if own is None or len(own) == 0:
             return None
@@ -97,7 +97,7 @@ class PlaceBook:
         joined = np.concatenate(parts)
         joined = joined[np.hypot(joined[:, 0], joined[:, 1]) <= self._company_m]
         joined = thinned(joined, RASTER_M)
-        return Company(node_id, joined, self._chosen(joined))
+        return LocalSubmap(node_id, joined, self._chosen(joined))
 
     def _chosen(self, points: Points) -> Points:
         """Return an even choice of points, as many as a search needs."""

@@ -11,7 +11,7 @@ from lemtomap.topo.loops.closer import LoopCloser
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.descriptor import describe
 from lemtomap.topo.loops.index import PlaceIndex
-from lemtomap.topo.loops.locator import Locator, Look
+from lemtomap.topo.loops.locator import Locator, WindowSnapshot
 from lemtomap.topo.recognition import (
     Closed,
     Decision,
@@ -113,7 +113,7 @@ class LoopRecogniser:
     def _locate(self, situation: Situation, locator: Locator) -> list[Decision]:
         """Look for the robot in the rest of the map."""
         if locator.due(situation.travelled_m, situation.turned_rad):
-            locator.look(Look.of(situation))
+            locator.look(WindowSnapshot.of(situation))
         found = locator.update(self.config.locator.budget if situation.lost else self.config.budget)
         if found is not None:
             self._closer.restart()

@@ -25,7 +25,7 @@ from lemtomap.types import GridView
 
 
 @dataclass(frozen=True, slots=True)
-class MatchConfig:
+class AlignConfig:
     """What a match must show to be believed."""
 
     least_points: int = within(40, 3, 1000)  # boundary points the window must know about
@@ -53,7 +53,7 @@ class MatchConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Match:
+class PlaceMatch:
     """Where the place stands in the window, or why that is not known."""
 
     T_grid_node: Pose
@@ -102,8 +102,8 @@ def match_place(
     hits_grid: NDArray[np.float64],
     grid: GridView,
     predicted: tuple[Pose, Covariance],
-    config: MatchConfig,
-) -> Match:
+    config: AlignConfig,
+) -> PlaceMatch:
     """Align a place with hits, float64 (N, 2), metres, grid frame; two more columns: whence each was seen.
 
     `predicted` is T_grid_node and its covariance, float64 (3, 3) in axes of the node. Holds: a refused match
@@ -111,7 +111,7 @@ def match_place(
     """
     start, covariance = predicted
     if len(boundary.points) < config.least_points or len(hits_grid) < config.least_points:
-        return Match(start, covariance, 0.0, "too little to match")
+        return PlaceMatch(start, covariance, 0.0, "too little to match")
     field = _field(hits_grid, grid, start, boundary.radius_m + 1.0)
     coarse = _searched(boundary, field, start, covariance, config)
     T_grid_node, posterior = _refined(boundary, field, coarse, predicted, config)
@@ -122,8 +122,8 @@ def match_place(
     score = near / max(1, known)
     refused = _doubts(between(start, T_grid_node), covariance, known, score, len(boundary.points), config)
     if refused:
-        return Match(start, covariance, score, refused)
-    return Match(T_grid_node, posterior, score)
+        return PlaceMatch(start, covariance, score, refused)
+    return PlaceMatch(T_grid_node, posterior, score)
 
 
 def _field(targets: NDArray[np.float64], grid: GridView, centre: Pose, half_m: float) -> _Field:
@@ -138,7 +138,7 @@ def _field(targets: NDArray[np.float64], grid: GridView, centre: Pose, half_m: f
 
 
 def _searched(
-    boundary: Boundary, field: _Field, start: Pose, covariance: Covariance, config: MatchConfig
+    boundary: Boundary, field: _Field, start: Pose, covariance: Covariance, config: AlignConfig
 ) -> Pose:
     """Return the best start for the refinement within the prediction's three sigmas.
 
@@ -170,7 +170,7 @@ def _refined(
     field: _Field,
     start: Pose,
     predicted: tuple[Pose, Covariance],
-    config: MatchConfig,
+    config: AlignConfig,
 ) -> tuple[Pose, Covariance]:
     """Return the pose of least error and its covariance in axes of the node."""
     prior_pose, prior_covariance = predicted
@@ -225,7 +225,7 @@ def _axes(information: Covariance, weak_axis: float) -> tuple[NDArray[np.float64
 
 
 def _doubts(
-    moved: Pose, covariance: Covariance, known: int, score: float, points: int, config: MatchConfig
+    moved: Pose, covariance: Covariance, known: int, score: float, points: int, config: AlignConfig
 ) -> str:
     if known < max(config.least_points, config.least_share * points):
         return "the window knows too little of the place"

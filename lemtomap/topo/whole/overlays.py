@@ -17,7 +17,7 @@ from lemtomap.se2 import Pose, between, transform
 from lemtomap.topo.cells import averaged, thinned
 from lemtomap.topo.graph import Covariance, sure_of
 from lemtomap.topo.kernels import fitting, lines
-from lemtomap.topo.whole.trail import Look
+from lemtomap.topo.whole.trail import TrailScan
 
 Points = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class Passes:
     only seem to meet, because a loop is still open, must not be overlaid.
     """
 
-    def __init__(self, track: Pose, looks: Sequence[Look], joined: Callable[[int, int], bool]) -> None:
+    def __init__(self, track: Pose, looks: Sequence[TrailScan], joined: Callable[[int, int], bool]) -> None:
         self._looks = looks
         self._are_joined = joined
         self._scans = np.array([look.scan for look in looks], dtype=np.int64)

@@ -35,7 +35,7 @@ HIT_STEP_M = 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class TrailScan:
     """The hits of one scan of the drive."""
 
     scan: int
@@ -63,12 +63,12 @@ class _LookFile:
         hits = np.clip(np.rint(hits_base / HIT_STEP_M), -limit, limit).astype("<i2")
         self._file.write(struct.pack("<qi", scan, len(hits)) + hits.tobytes())
 
-    def looks(self) -> Iterator[Look]:
+    def looks(self) -> Iterator[TrailScan]:
         self._file.seek(0)
         while head := self._file.read(12):
             scan, count = struct.unpack("<qi", head)
             hits = np.frombuffer(self._file.read(4 * count), "<i2").reshape(-1, 2)
-            yield Look(scan, hits.astype(np.float32) * np.float32(HIT_STEP_M))
+            yield TrailScan(scan, hits.astype(np.float32) * np.float32(HIT_STEP_M))
         self._file.seek(0, 2)
 
     def close(self) -> None:
@@ -128,7 +128,7 @@ class ScanTrail:
             yield np.frombuffer(data, RECORD)
             position += at_once
 
-    def looks(self) -> Iterator[Look]:
+    def looks(self) -> Iterator[TrailScan]:
         """Iterate over the scans whose hits were kept, in the order of the drive."""
         return self._looks.looks()
 

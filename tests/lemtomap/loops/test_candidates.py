@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import compose
-from lemtomap.topo.graph import Edge, Leg
+from lemtomap.topo.graph import DirectedEdge, Edge
 from lemtomap.topo.loops.candidates import search_box, spaced
 from lemtomap.topo.loops.config import GateConfig
-from lemtomap.topo.loops.outlook import Outlook
+from lemtomap.topo.loops.outlook import GraphUncertainty
 from lemtomap.topo.place.hits import HitMap
 from lemtomap.topo.recognition import Situation
 from lemtomap.types import EdgeType, GridView
@@ -32,12 +32,12 @@ class Ring:
             self.at[k + 1].append(edge)
 
     def legs_of(self, node_id):
-        return [Leg.along(edge, node_id) for edge in self.at[node_id]]
+        return [DirectedEdge.along(edge, node_id) for edge in self.at[node_id]]
 
 
 def arrived(count, drift=(0.0, 0.0, 0.0)):
     """The robot back at node 0 after the whole way round, its map off by a drift."""
-    outlook = Outlook(Ring(count), count, GATE)
+    outlook = GraphUncertainty(Ring(count), count, GATE)
     outlook.advance(10 * count)
     T_grid_here = compose(ROBOT, np.array(drift))
     return outlook, Situation(

@@ -5,7 +5,7 @@ import numpy as np
 from lemtomap.se2 import compose
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Hypotheses, Sighting
-from lemtomap.topo.loops.matcher import Match
+from lemtomap.topo.loops.matcher import SearchMatch
 
 OLD_MAP = {k: np.array([float(k), 0.0, 0.0]) for k in range(20)}
 
@@ -17,7 +17,7 @@ def around(node_id):
 
 def sighting(node_id, travelled_m, off=(0.0, 0.0, 0.0), evidence=1.0):
     T_grid_place = compose(np.array([3.0, 1.0, 0.5]), compose(OLD_MAP[node_id], np.array(off)))
-    match = Match(T_grid_place, np.eye(3) * 1e-4, 0.95, 0.02, 0.9, 0.7, 0.3, 0.02, 0.5)
+    match = SearchMatch(T_grid_place, np.eye(3) * 1e-4, 0.95, 0.02, 0.9, 0.7, 0.3, 0.02, 0.5)
     return Sighting(
         node_id, match, 100, T_grid_place, np.eye(3) * 1e-4, travelled_m, informs=True, evidence=evidence
     )

@@ -8,7 +8,7 @@ import pytest
 from lemtomap.se2 import pose
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.judge import Judge
-from lemtomap.topo.loops.places import Company
+from lemtomap.topo.loops.places import LocalSubmap
 
 PITCH_M, HERE, SEEN = 10.0, 24, 26
 AT = {node_id: pose(float(node_id), 0.0, 0.0) for node_id in range(41)}
@@ -42,7 +42,9 @@ def judge():
     places = SimpleNamespace(
         around=lambda *_: around,
         has=lambda node_id: node_id in AT,
-        company=lambda node_id: Company(node_id, near(AT[node_id][0]) - AT[node_id][:2], np.empty((0, 2))),
+        company=lambda node_id: LocalSubmap(
+            node_id, near(AT[node_id][0]) - AT[node_id][:2], np.empty((0, 2))
+        ),
     )
     return Judge(LoopConfig(), places)
 

@@ -8,11 +8,11 @@ import pytest
 
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.locator import Guess, Locator
-from lemtomap.topo.loops.matcher import Match
+from lemtomap.topo.loops.matcher import SearchMatch
 
 CONFIG = LoopConfig()
 CHECKS = CONFIG.locator.checks
-GOOD = Match(np.zeros(3), np.eye(3) * 1e-4, *([1.0] * (len(Match.__dataclass_fields__) - 2)))
+GOOD = SearchMatch(np.zeros(3), np.eye(3) * 1e-4, *([1.0] * (len(SearchMatch.__dataclass_fields__) - 2)))
 SEEN = 2 * CONFIG.points
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from lemtomap.se2 import between, compose
-from lemtomap.topo.graph import Edge, Leg
+from lemtomap.topo.graph import DirectedEdge, Edge
 from lemtomap.topo.loops.config import GateConfig
-from lemtomap.topo.loops.outlook import Outlook
+from lemtomap.topo.loops.outlook import GraphUncertainty
 from lemtomap.types import EdgeType
 
 EXACT = GateConfig(shift_var_per_m=0.0, turn_var_per_m=0.0)
@@ -26,7 +26,7 @@ class Graph:
         self.at[b].append(edge)
 
     def legs_of(self, node_id):
-        return [Leg.along(edge, node_id) for edge in self.at[node_id]]
+        return [DirectedEdge.along(edge, node_id) for edge in self.at[node_id]]
 
 
 def chain(count):
@@ -47,7 +47,7 @@ def sampled(count, start, draws=4000):
 
 @pytest.mark.parametrize("start", [0, 9])
 def test_covariance_is_that_of_sampled_chains(start):
-    outlook = Outlook(chain(24), 4, EXACT)
+    outlook = GraphUncertainty(chain(24), 4, EXACT)
     outlook.advance(100)
     expected = outlook.between(start, 24)
     poses = sampled(24, start)
@@ -60,7 +60,7 @@ def test_covariance_is_that_of_sampled_chains(start):
 
 def test_a_node_made_later_is_reached_by_its_edge():
     graph = chain(5)
-    outlook = Outlook(graph, 0, EXACT)
+    outlook = GraphUncertainty(graph, 0, EXACT)
     outlook.advance(100)
     graph.join(5, 6, STEP)
     assert outlook.between(0, 6) is None
@@ -72,7 +72,7 @@ def test_only_nodes_that_may_be_here_are_near():
     graph = Graph()
     for k in range(60):
         graph.join(k, k + 1, np.array([1.0, 0.0, 0.0 if k != 30 else np.pi]))
-    outlook = Outlook(graph, 60, GateConfig(shift_var_per_m=1e-4, turn_var_per_m=1e-6))
+    outlook = GraphUncertainty(graph, 60, GateConfig(shift_var_per_m=1e-4, turn_var_per_m=1e-6))
     outlook.advance(100)
     x, y, _ = outlook.pose(60)
     near, _, _ = outlook.near(60, x, y, 3.0, 12.0)
@@ -83,7 +83,7 @@ def test_only_nodes_that_may_be_here_are_near():
 
 def test_slices_reach_what_one_go_reaches():
     graph = chain(50)
-    whole, sliced = Outlook(graph, 25, EXACT), Outlook(graph, 25, EXACT)
+    whole, sliced = GraphUncertainty(graph, 25, EXACT), GraphUncertainty(graph, 25, EXACT)
     whole.advance(1000)
     while not sliced.advance(3):
         pass

@@ -11,7 +11,7 @@ from lemtomap.se2 import (
 )
 from lemtomap.topo.kernels import fitting
 from lemtomap.topo.kernels import search as kernels
-from lemtomap.topo.loops.config import MatchConfig
+from lemtomap.topo.loops.config import SearchConfig
 from lemtomap.topo.loops.matcher import Reference, Search, SearchBox
 from lemtomap.types import GridView
 
@@ -94,7 +94,7 @@ def test_the_search_finds_the_best_pose_of_the_whole_box():
     rng = np.random.default_rng(5)
     points_place = room()[::7] + rng.normal(0.0, 0.02, room()[::7].shape)
     T_grid_place = np.array([0.43, -0.31, 0.2])
-    config = MatchConfig(levels=4, least_score=0.2)
+    config = SearchConfig(levels=4, least_score=0.2)
     reference = Reference(view_of(transform(T_grid_place, room())), transform(T_grid_place, room()), config)
     search = Search(reference, points_place, SearchBox(np.array([0.2, 0.0, 0.1]), 0.8, 0.8, 0.25))
     assert search.advance(10**9)
@@ -115,7 +115,7 @@ def test_the_search_finds_the_best_pose_of_the_whole_box():
 def test_a_place_turned_half_round_is_found_to_the_centimetre_in_slices_of_any_size(budget):
     T_grid_place = np.array([0.83, -0.52, 3.0])
     points_grid = transform(T_grid_place, room())
-    reference = Reference(view_of(points_grid), points_grid, MatchConfig())
+    reference = Reference(view_of(points_grid), points_grid, SearchConfig())
     search = Search(reference, room()[::2], SearchBox(np.zeros(3), 2.0, 2.0, np.pi))
     slices, done, works = 1, False, [0]
     while not done:
@@ -133,7 +133,7 @@ def test_a_place_turned_half_round_is_found_to_the_centimetre_in_slices_of_any_s
 
 def test_a_corridor_is_its_own_rival_and_says_that_it_holds_no_length():
     corridor = np.concatenate([wall(-9, -1, 9, -1), wall(-9, 1, 9, 1)])
-    reference = Reference(view_of(corridor), corridor, MatchConfig())
+    reference = Reference(view_of(corridor), corridor, SearchConfig())
     piece = corridor[np.abs(corridor[:, 0]) < 4.0]
     search = Search(reference, piece, SearchBox(np.zeros(3), 2.0, 1.0, 0.3))
     search.advance(10**9)
@@ -145,7 +145,7 @@ def test_a_corridor_is_its_own_rival_and_says_that_it_holds_no_length():
 def test_free_space_contradicts_a_place_that_is_not_here():
     points = room()
     elsewhere = transform(np.array([0.0, 0.0, 0.7]), points * 0.8)
-    reference = Reference(view_of(elsewhere), elsewhere, MatchConfig(least_score=0.05))
+    reference = Reference(view_of(elsewhere), elsewhere, SearchConfig(least_score=0.05))
     match = reference.refine(points, np.zeros(3))
     assert match.contradicted > 0.4
     assert match.explained < 0.6
@@ -168,7 +168,7 @@ def test_tally_counts_as_its_slow_twin_does():
 def test_covariance_is_in_the_places_own_axes():
     T_grid_place = np.array([0.1, 0.2, np.pi / 2])
     corridor = np.concatenate([wall(-6, -1, 6, -1), wall(-6, 1, 6, 1)])
-    reference = Reference(view_of(corridor), corridor, MatchConfig())
+    reference = Reference(view_of(corridor), corridor, SearchConfig())
     own = transform(inverse(T_grid_place), corridor)
     match = reference.refine(own, compose(T_grid_place, np.array([0.0, 0.02, 0.0])))
     assert match.covariance[1, 1] > 25 * match.covariance[0, 0]

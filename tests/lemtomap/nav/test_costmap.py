@@ -7,7 +7,7 @@ from lemtomap.nav.config import BodyLimits, CostmapConfig
 from lemtomap.nav.kernels import fields as kernels
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.costmap import Costmap
-from lemtomap.nav.types import Sighting
+from lemtomap.nav.types import ObstacleSighting
 from lemtomap.types import GridView, Scan, Twist
 
 BODY = BodyLimits()
@@ -24,7 +24,7 @@ def scan(stamp_s: float, range_m: float) -> Scan:
 
 
 def see(costmap: Costmap, stamp_s: float, range_m: float) -> None:
-    costmap.see(Sighting.from_scan(scan(stamp_s, range_m), se2.pose(1.0, 3.0, 0.0)), se2.IDENTITY)
+    costmap.see(ObstacleSighting.from_scan(scan(stamp_s, range_m), se2.pose(1.0, 3.0, 0.0)), se2.IDENTITY)
 
 
 def lethal(costmap: Costmap, now_s: float) -> int:
@@ -72,12 +72,12 @@ def test_floor_seen_beside_a_thin_bar_does_not_hide_it_and_floor_seen_where_it_w
     floor = np.column_stack([np.repeat([1.01, 1.04], 61), np.tile(aside, 2), np.zeros(122)])
     bar = np.column_stack([np.full(61, 1.02), aside, np.full(61, 0.1)])
     for stamp_s in (0.0, 0.2, 0.4):
-        costmap.see(Sighting.from_cloud(stamp_s, robot, np.concatenate([floor, bar])), se2.IDENTITY)
+        costmap.see(ObstacleSighting.from_cloud(stamp_s, robot, np.concatenate([floor, bar])), se2.IDENTITY)
     assert lethal(costmap, 0.4) >= 12
-    costmap.see(Sighting.from_cloud(0.6, robot, floor), se2.IDENTITY)
+    costmap.see(ObstacleSighting.from_cloud(0.6, robot, floor), se2.IDENTITY)
     assert lethal(costmap, 0.6) >= 12  # one look beside it, by a pose that moved a little
     for stamp_s in (0.8, 1.0, 1.2):
-        costmap.see(Sighting.from_cloud(stamp_s, robot, floor), se2.IDENTITY)
+        costmap.see(ObstacleSighting.from_cloud(stamp_s, robot, floor), se2.IDENTITY)
     assert lethal(costmap, 1.2) == 0
 
 
@@ -86,7 +86,7 @@ def test_recovering_forgets_what_the_laser_sees_again_not_what_lies_below_the_ca
     bar = np.column_stack([np.full(61, 1.02), np.linspace(-0.3, 0.3, 61), np.full(61, 0.1)])
     for stamp_s in (0.0, 0.2):
         see(costmap, stamp_s, 2.0)
-        costmap.see(Sighting.from_cloud(stamp_s, robot, bar), se2.IDENTITY)
+        costmap.see(ObstacleSighting.from_cloud(stamp_s, robot, bar), se2.IDENTITY)
     both = lethal(costmap, 0.2)
     costmap.forget_live()
     assert 12 <= lethal(costmap, 0.2) < both
@@ -99,11 +99,13 @@ def test_a_person_whom_laser_and_camera_saw_leaves_no_ghost_and_a_bar_beside_him
     person = np.column_stack([np.tile(legs, (2, 1)), np.repeat([0.15, 0.3], 41)])
     bar = np.column_stack([np.full(61, 1.02), np.linspace(0.6, 1.2, 61), np.full(61, 0.1)])
     for stamp_s in (0.0, 0.2, 0.4):
-        costmap.see(Sighting.from_points(stamp_s, robot, legs), se2.IDENTITY)
-        costmap.see(Sighting.from_cloud(stamp_s, robot, np.concatenate([person, bar])), se2.IDENTITY)
+        costmap.see(ObstacleSighting.from_points(stamp_s, robot, legs), se2.IDENTITY)
+        costmap.see(ObstacleSighting.from_cloud(stamp_s, robot, np.concatenate([person, bar])), se2.IDENTITY)
     costs = costmap.build(0.4, (1.0, 3.0))
     assert costs.state[cell(costs, 2.0, 3.0)] == kernels.LETHAL
-    gone = Sighting(0.6, robot, np.empty((0, 2)), 3.0 * np.column_stack([np.cos(across), np.sin(across)]))
+    gone = ObstacleSighting(
+        0.6, robot, np.empty((0, 2)), 3.0 * np.column_stack([np.cos(across), np.sin(across)])
+    )
     for _ in range(4):
         costmap.see(gone, se2.IDENTITY)
     costs = costmap.build(0.6, (1.0, 3.0))

@@ -10,7 +10,7 @@ from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.explore.memory import SeenMemory
 from lemtomap.nav.motion.costmap import Costmap
 from lemtomap.nav.navigator import Navigator
-from lemtomap.nav.types import NavOutput, NavState, Reason
+from lemtomap.nav.types import NavOutput, NavReason, NavState
 from lemtomap.topo.events import GroundSeen, OpeningDone, OpeningSeen
 from lemtomap.topo.graph import OpeningState, Placeholder
 from lemtomap.types import Twist
@@ -140,7 +140,7 @@ def test_pictures_of_the_ground_far_from_the_robot_are_with_the_map():
     assert memory.recall(unknown, graph).sum() > SeenMemory().recall(unknown).sum() + 1000
 
 
-@pytest.mark.parametrize(("reason", "tries"), [(Reason.BLOCKED, 2), (Reason.NO_ROUTE, 4)])
+@pytest.mark.parametrize(("reason", "tries"), [(NavReason.BLOCKED, 2), (NavReason.NO_ROUTE, 4)])
 def test_an_opening_to_which_every_route_is_closed_is_tried_more_often(reason, tries):
     """Somebody in the only door bars the way to all of them at once."""
     world, explorer, output, goals = office(), Explorer(), None, 0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lemtomap.nav.navigator import Navigator
-from lemtomap.nav.types import Goal, NavState, Reason
+from lemtomap.nav.types import Goal, NavReason, NavState
 from tests.lemtomap.nav.world import (
     RES,
     Graph,
@@ -95,7 +95,7 @@ def test_says_at_once_why_there_is_no_route():
     outputs = run(world, Navigator(), 50, 5.0)
     assert len(outputs) == 1
     assert outputs[0].state == NavState.FAILED
-    assert outputs[0].reason == Reason.NO_ROUTE
+    assert outputs[0].reason == NavReason.NO_ROUTE
     assert "not connected" in outputs[0].text
 
 
@@ -110,7 +110,7 @@ def test_refuses_a_point_out_of_reach_soon_after_it_came_to_its_node():
     world = two_rooms()
     outputs = run(world, Navigator(), Goal(5, (0.4, -1.3)), 60.0)
     assert outputs[-1].state == NavState.FAILED
-    assert outputs[-1].reason == Reason.BLOCKED
+    assert outputs[-1].reason == NavReason.BLOCKED
     assert "out of reach" in outputs[-1].text
     assert len(outputs) * 0.1 < 5.2 / 0.5 + 12.0
 

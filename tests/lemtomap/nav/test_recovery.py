@@ -5,10 +5,10 @@ import pytest
 
 from lemtomap.nav.config import RecoveryConfig
 from lemtomap.nav.motion.recovery import (
-    Ladder,
+    BreadcrumbTrail,
     ProgressWatch,
-    Rung,
-    WayBack,
+    RecoveryBehaviour,
+    RecoverySequence,
 )
 from lemtomap.se2 import IDENTITY, pose
 
@@ -46,19 +46,21 @@ def test_rocking_to_and_fro_is_stuck():
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_looking_round_ends_after_one_turn_whichever_way_the_heading_runs(sign):
-    ladder, now_s, turned_rad = Ladder(CONFIG), 0.0, 0.0
-    while ladder.climb(IDENTITY, now_s) != Rung.TURN:
+    ladder, now_s, turned_rad = RecoverySequence(CONFIG), 0.0, 0.0
+    while ladder.climb(IDENTITY, now_s) != RecoveryBehaviour.TURN:
         pass
-    while ladder.step(pose(0.0, 0.0, sign * turned_rad), WayBack(), now_s, room_behind=True) is not None:
+    while (
+        ladder.step(pose(0.0, 0.0, sign * turned_rad), BreadcrumbTrail(), now_s, room_behind=True) is not None
+    ):
         now_s, turned_rad = now_s + 0.01, turned_rad + 0.1
     assert 2.0 * np.pi <= turned_rad < 2.0 * np.pi + 0.2
     assert not ladder.running
 
 
 def test_backing_off_ends_where_there_is_no_room_behind_and_after_its_way():
-    ladder = Ladder(CONFIG)
+    ladder = RecoverySequence(CONFIG)
     ladder.back_off(IDENTITY, 0.0, 0.2)
-    assert ladder.step(pose(-0.1, 0.0, 0.0), WayBack(), 0.1, room_behind=True).v_mps < 0.0
-    assert ladder.step(pose(-0.21, 0.0, 0.0), WayBack(), 0.2, room_behind=True) is None
+    assert ladder.step(pose(-0.1, 0.0, 0.0), BreadcrumbTrail(), 0.1, room_behind=True).v_mps < 0.0
+    assert ladder.step(pose(-0.21, 0.0, 0.0), BreadcrumbTrail(), 0.2, room_behind=True) is None
     ladder.back_off(IDENTITY, 1.0, 0.2)
-    assert ladder.step(IDENTITY, WayBack(), 1.1, room_behind=False) is None
+    assert ladder.step(IDENTITY, BreadcrumbTrail(), 1.1, room_behind=False) is None

@@ -9,12 +9,12 @@ import pytest
 from lemtomap.nav.config import NavConfig, RecoveryConfig
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.route.planner import Route
-from lemtomap.nav.route.way import Moment, WayKeeper
+from lemtomap.nav.route.way import CycleInput, RouteKeeper
 from lemtomap.nav.types import (
     Goal,
+    NavReason,
     NavState,
-    Reason,
-    Sighting,
+    ObstacleSighting,
 )
 from lemtomap.topo.events import Bumped, EdgeBlocked, EdgeTraversed
 from lemtomap.types import RouteEdge, Twist
@@ -57,14 +57,14 @@ def test_uses_a_door_again_that_opens():
 
 def test_an_edge_found_cut_while_it_is_closed_is_not_closed_for_longer():
     """Three edges through one doorway, tried one after another, made 30 minutes of the first one's minute."""
-    keeper, edge = WayKeeper(NavConfig()), RouteEdge(9, 2, 1.0, 2.5)
+    keeper, edge = RouteKeeper(NavConfig()), RouteEdge(9, 2, 1.0, 2.5)
     world = two_rooms()
     spans_s = []
     world.graph.links = [(9, 1, 2)]
     for now_s in (0.0, 3.0, 6.0, 70.0, 400.0):
-        keeper.keep(Goal(1), Moment(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s))
+        keeper.keep(Goal(1), CycleInput(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s))
         keeper.route = Route((1, 2), (edge,), 2.5)
-        moment = Moment(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s)
+        moment = CycleInput(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s)
         assert keeper.close_next(moment)
         spans_s += [event.until_s - now_s for event in moment.events if isinstance(event, EdgeBlocked)]
         if now_s == 70.0:
@@ -119,7 +119,7 @@ def test_refuses_with_the_reason_when_no_way_is_left():
     navigator = Navigator()
     outputs = run(world, navigator, 9, 60.0)
     assert outputs[-1].state == NavState.FAILED
-    assert outputs[-1].reason in {Reason.NO_ROUTE, Reason.BLOCKED}
+    assert outputs[-1].reason in {NavReason.NO_ROUTE, NavReason.BLOCKED}
     assert "closed" in outputs[-1].text
     assert world.contacts == 0
     assert run(world, navigator, 3, 30.0)[-1].state == NavState.ARRIVED
@@ -282,7 +282,7 @@ def test_a_depth_camera_keeps_it_off_what_the_laser_overlooks():
     navigator.set_goal(6, world.now_s)
     output = None
     for _ in range(600):
-        seen = [world.sighting(), Sighting.from_cloud(world.now_s, world.T_odom_base, world.cloud())]
+        seen = [world.sighting(), ObstacleSighting.from_cloud(world.now_s, world.T_odom_base, world.cloud())]
         output = navigator.step(
             world.view(), world.graph, world.T_odom_base, world.twist, seen, (), world.now_s
         )
@@ -306,7 +306,7 @@ def test_gives_up_in_bounded_time_when_the_wheels_spin():
         world.now_s += 0.1
     assert output is not None
     assert output.state == NavState.FAILED
-    assert output.reason in {Reason.BLOCKED, Reason.NO_ROUTE}
+    assert output.reason in {NavReason.BLOCKED, NavReason.NO_ROUTE}
     assert world.now_s < 100.0 + 180.0
 
 
@@ -319,4 +319,4 @@ def test_waits_for_a_lost_pose_and_then_says_so():
     assert outputs[10].state == NavState.WAITING
     assert outputs[10].twist.v_mps == pytest.approx(0.0)
     assert outputs[-1].state == NavState.FAILED
-    assert outputs[-1].reason == Reason.LOST
+    assert outputs[-1].reason == NavReason.LOST

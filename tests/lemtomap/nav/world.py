@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lemtomap import se2
-from lemtomap.nav.types import Contact, ContactKind, Sighting
+from lemtomap.nav.types import Contact, ContactKind, ObstacleSighting
 from lemtomap.types import (
     EdgeType,
     GridView,
@@ -152,8 +152,8 @@ class World:
         far = np.maximum(np.abs(x - self.pose[0]), np.abs(y - self.pose[1])) > reach_m
         self.known[rows[far], cols[far]] = False
 
-    def sighting(self) -> Sighting:
-        return Sighting.from_scan(self.scan(), self.T_odom_base)
+    def sighting(self) -> ObstacleSighting:
+        return ObstacleSighting.from_scan(self.scan(), self.T_odom_base)
 
     def drive(self, twist: Twist, dt: float = 0.1) -> None:
         for _ in range(5):

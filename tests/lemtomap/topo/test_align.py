@@ -10,7 +10,7 @@ from lemtomap.se2 import (
 )
 from lemtomap.topo.kernels import gathering
 from lemtomap.topo.place import decode_place, encode_place
-from lemtomap.topo.place.align import MatchConfig, match_place
+from lemtomap.topo.place.align import AlignConfig, match_place
 from lemtomap.topo.place.hits import HitMap
 from lemtomap.types import GridView
 from tests.lemtomap.topo.test_place import office
@@ -39,7 +39,7 @@ def test_a_place_is_found_within_two_centimetres_where_the_prediction_was_off(se
     T_grid_node = pose(0.7, -0.4, rng.uniform(-3, 3))
     hits = transform(T_grid_node, office(noise_m=0.01, seed=seed + 10))
     predicted = compose(T_grid_node, rng.normal(0, [0.12, 0.12, 0.05]))
-    match = match_place(at_node(office(seed=seed)), hits, window_of(hits), (predicted, PRIOR), MatchConfig())
+    match = match_place(at_node(office(seed=seed)), hits, window_of(hits), (predicted, PRIOR), AlignConfig())
     error = between(T_grid_node, match.T_grid_node)
     assert match.refused == ""
     assert match.score > 0.95
@@ -52,7 +52,7 @@ def test_without_scan_points_the_window_alone_will_do():
     points = office(noise_m=0.01, seed=11)
     grid = window_of(points)
     hits = HitMap().around((0.0, 0.0), 6.0, grid, 50)
-    match = match_place(at_node(office()), hits, grid, (pose(0.1, -0.12, 0.05), PRIOR), MatchConfig())
+    match = match_place(at_node(office()), hits, grid, (pose(0.1, -0.12, 0.05), PRIOR), AlignConfig())
     assert match.refused == ""
     assert np.hypot(match.T_grid_node[0], match.T_grid_node[1]) < 0.04
 
@@ -65,7 +65,7 @@ def corridor(length_m=4.8):
 def test_along_a_bare_corridor_the_prediction_stands_and_says_how_uncertain_it_is():
     hits = corridor(8.0)
     predicted = pose(0.2, 0.1, 0.03)
-    match = match_place(at_node(corridor()), hits, window_of(hits), (predicted, PRIOR), MatchConfig())
+    match = match_place(at_node(corridor()), hits, window_of(hits), (predicted, PRIOR), AlignConfig())
     assert match.refused == ""
     assert abs(match.T_grid_node[1]) < 0.02
     assert match.T_grid_node[0] == pytest.approx(0.2, abs=0.15)
@@ -78,7 +78,7 @@ def test_another_place_is_refused_and_the_prediction_kept():
     hits = corridor(8.0)
     hits = transform(pose(0.0, 0.0, 0.6), hits)
     predicted = (pose(0.3, 0.2, 0.1), PRIOR)
-    match = match_place(at_node(office()), hits, window_of(hits), predicted, MatchConfig())
+    match = match_place(at_node(office()), hits, window_of(hits), predicted, AlignConfig())
     assert "is seen" in match.refused or "expects" in match.refused
     np.testing.assert_array_equal(match.T_grid_node, predicted[0])
 
@@ -88,7 +88,7 @@ def test_a_place_the_window_hardly_knows_is_refused():
     few = points[points[:, 0] > 2.9]
     unknown = window_of(few)
     unknown.occupancy[unknown.occupancy == 0] = -1
-    match = match_place(at_node(points), few, unknown, (pose(0, 0, 0), PRIOR), MatchConfig())
+    match = match_place(at_node(points), few, unknown, (pose(0, 0, 0), PRIOR), AlignConfig())
     assert "too little" in match.refused
 
 
@@ -149,7 +149,7 @@ def test_the_far_face_of_a_wall_is_not_taken_for_its_near_one(side, off_m):
     place = decode_place(encode_place(seen_from(piers(1.5, -2.5), -1.0)))
     hits = seen_from(piers(1.5 + off_m, -2.5 + off_m), side)
     predicted = pose(0.05, 0.02, 0.01)
-    match = match_place(place, hits, window_of(hits), (predicted, PRIOR), MatchConfig())
+    match = match_place(place, hits, window_of(hits), (predicted, PRIOR), AlignConfig())
     assert match.refused == ""
     assert abs(match.T_grid_node[0] - (0.05 if off_m else 0.0)) < 0.03
     assert abs(match.T_grid_node[1]) < 0.02
@@ -175,7 +175,7 @@ def test_a_wall_that_goes_on_out_of_sight_is_not_pulled_into_view():
     window = half_seen(hits, (-1.9, -1.0), (8.0, 0.6))
     predicted = pose(0.1, 0.0, 0.0)
     prior = np.diag([0.17**2, 0.01**2, 0.01**2])
-    match = match_place(at_node(place), hits, window, (predicted, prior), MatchConfig())
+    match = match_place(at_node(place), hits, window, (predicted, prior), AlignConfig())
     assert match.T_grid_node[0] == pytest.approx(0.1, abs=0.05)
     assert match.covariance[0, 0] > 0.1**2
 
@@ -191,7 +191,7 @@ def test_a_wall_across_a_corridor_is_found_however_far_the_search_goes(sigma_m):
     window = half_seen(hits, (-6.0, -4.0), (2.05, 1.85))
     predicted = pose(0.26, 0.0, 0.0)
     prior = np.diag([sigma_m**2, 0.01**2, 0.01**2])
-    match = match_place(at_node(place), hits, window, (predicted, prior), MatchConfig())
+    match = match_place(at_node(place), hits, window, (predicted, prior), AlignConfig())
     assert match.refused == ""
     assert abs(match.T_grid_node[0]) < 0.03
 
@@ -200,7 +200,7 @@ def test_a_corridor_a_degree_askew_does_not_slide_the_place_along():
     hits = transform(pose(0.0, 0.02, 0.015), corridor(8.0))
     prior = np.diag([0.24**2, 0.007**2, 0.004**2])
     predicted = pose(0.0, 0.0, 0.0)
-    match = match_place(at_node(corridor()), hits, window_of(hits), (predicted, prior), MatchConfig())
+    match = match_place(at_node(corridor()), hits, window_of(hits), (predicted, prior), AlignConfig())
     assert match.refused == ""
     assert abs(match.T_grid_node[0]) < 0.01
     assert match.covariance[0, 0] == pytest.approx(0.24**2, rel=0.1)
@@ -209,7 +209,7 @@ def test_a_corridor_a_degree_askew_does_not_slide_the_place_along():
 
 def test_no_match_claims_to_be_surer_than_windows_are_straight():
     hits = office(noise_m=0.0, seed=3)
-    match = match_place(at_node(office()), hits, window_of(hits), (pose(0, 0, 0), PRIOR), MatchConfig())
+    match = match_place(at_node(office()), hits, window_of(hits), (pose(0, 0, 0), PRIOR), AlignConfig())
     sigmas = np.sqrt(np.diag(match.covariance))
-    assert np.all(sigmas[:2] > 0.9 * MatchConfig().bend_m)
-    assert sigmas[2] > 0.9 * MatchConfig().bend_rad
+    assert np.all(sigmas[:2] > 0.9 * AlignConfig().bend_m)
+    assert sigmas[2] > 0.9 * AlignConfig().bend_rad

@@ -6,7 +6,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.file.reader import TopoReader
 from lemtomap.topo.file.store import TopoStore
-from lemtomap.topo.local import LocalMap, Standing
+from lemtomap.topo.local import LocalMap, NodePoseEstimate
 from lemtomap.topo.localisation import NotStarted
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.types import EdgeType
@@ -150,7 +150,9 @@ def test_the_nearest_node_that_is_surely_predicted_is_looked_for_in_the_window(t
             [(0.5, 0.01, True), (1.0, 0.5, False), (2.0, 0.1, False), (2.5, 0.01, False)], start=1
         ):
             covariance = np.eye(3) * sigma_m**2
-            local.standings[node_id] = Standing(np.array([x_m, 0.0, 0.0]), covariance, anchored=anchored)
+            local.standings[node_id] = NodePoseEstimate(
+                np.array([x_m, 0.0, 0.0]), covariance, anchored=anchored
+            )
         assert local.predicted_near(np.zeros(3), 3.0, 0.2) == 3
         assert local.predicted_near(np.zeros(3), 1.9, 0.2) == 0
 
@@ -159,7 +161,7 @@ def test_a_refused_place_is_doubted_no_further_than_a_match_may_look():
     """What follows along the edges swung about by 16 degrees after a hall in which no place was matched."""
     config = TopoConfig()
     local = LocalMap(None, config)
-    local.standings[1] = Standing(pose(0, 0, 0), np.diag([1e-4, 1e-4, 1e-4]), anchored=False)
+    local.standings[1] = NodePoseEstimate(pose(0, 0, 0), np.diag([1e-4, 1e-4, 1e-4]), anchored=False)
     for _ in range(40):
         local.doubt(1)
     sigmas = np.sqrt(np.diag(local.standings[1].covariance))

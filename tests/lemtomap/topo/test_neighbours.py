@@ -7,7 +7,7 @@ import pytest
 
 from lemtomap.se2 import pose
 from lemtomap.topo.config import TopoConfig
-from lemtomap.topo.local import Standing
+from lemtomap.topo.local import NodePoseEstimate
 from lemtomap.topo.neighbours import NeighbourFinder
 from tests.lemtomap.topo.drive import room
 
@@ -23,8 +23,8 @@ def seams(sigma_m, way_m=24.0, walls=()):
     """Seams of a node to another 0.3 m beside it, known to sigma_m and so far along the edges."""
     doubt = np.diag([sigma_m**2, 0.01, 0.01])
     standings = {
-        HERE: Standing(pose(0.0, 0.0, 0.0), 1e-4 * np.eye(3), anchored=True, born=True),
-        THERE: Standing(pose(0.3, 0.0, 0.0), doubt, anchored=False),
+        HERE: NodePoseEstimate(pose(0.0, 0.0, 0.0), 1e-4 * np.eye(3), anchored=True, born=True),
+        THERE: NodePoseEstimate(pose(0.3, 0.0, 0.0), doubt, anchored=False),
     }
     reached = {HERE: SimpleNamespace(distance_m=0.0), THERE: SimpleNamespace(distance_m=way_m)}
     local = SimpleNamespace(standings=standings, reached=reached)

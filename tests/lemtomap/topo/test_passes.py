@@ -11,7 +11,7 @@ from lemtomap.se2 import (
     transform,
 )
 from lemtomap.topo.whole.overlays import Passes
-from lemtomap.topo.whole.trail import Look
+from lemtomap.topo.whole.trail import TrailScan
 
 ROOM = np.concatenate(
     [np.column_stack([np.linspace(-6, 6, 241), np.full(241, y)]) for y in (-3.0, 3.0)]
@@ -27,7 +27,7 @@ def twice_along(noise):
     truth = np.array(there + back)
     track = np.array(there + [compose(SLIP, each) for each in back])
     looks = [
-        Look(k, (transform(inverse(at), ROOM) + noise.normal(0.0, 0.01, ROOM.shape)).astype(np.float32))
+        TrailScan(k, (transform(inverse(at), ROOM) + noise.normal(0.0, 0.01, ROOM.shape)).astype(np.float32))
         for k, at in enumerate(truth)
     ]
     return truth, track, looks

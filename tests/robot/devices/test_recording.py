@@ -18,7 +18,7 @@ from lemtomap.robot.devices.recording import (
     OPENED,
     UP,
     Call,
-    Entry,
+    RecordedCall,
     Recorder,
 )
 from tools.checks.mcap_damage import (
@@ -32,10 +32,10 @@ from tools.checks.mcap_damage import (
 
 SMALL_LIMIT = 400_000
 OPENING = [
-    Entry(HOKUYO, Call.PORT, 1, OPENED),
-    Entry(HOKUYO, Call.TICK, 2),
-    Entry(HOKUYO, Call.RECEIVE, 3, b"VV"),
-    Entry(HOKUYO, Call.PORT, 4, UP),
+    RecordedCall(HOKUYO, Call.PORT, 1, OPENED),
+    RecordedCall(HOKUYO, Call.TICK, 2),
+    RecordedCall(HOKUYO, Call.RECEIVE, 3, b"VV"),
+    RecordedCall(HOKUYO, Call.PORT, 4, UP),
 ]
 
 
@@ -47,7 +47,7 @@ def entries(count=2000):
         device = (KOBUKI, HOKUYO)[int(rng.integers(2))]
         call = (Call.RECEIVE, Call.SEND, Call.TICK)[int(rng.integers(3))]
         data = b"" if call is Call.TICK else rng.bytes(int(rng.integers(1, 90)))
-        made.append(Entry(device, call, now, data))
+        made.append(RecordedCall(device, call, now, data))
     return made
 
 
@@ -62,7 +62,7 @@ def record(path, made, **options):
 
 
 def calls(path):
-    return [entry for entry in Recording.open(path).entries() if isinstance(entry, Entry)]
+    return [entry for entry in Recording.open(path).entries() if isinstance(entry, RecordedCall)]
 
 
 def chunks_of(path):
@@ -119,7 +119,7 @@ def test_a_damaged_chunk_is_lost_alone_and_the_gap_is_told(whole):
     recording = Recording.open(path)
     from_s, until_s = stretch(content)
     kept = [entry for entry in made if not from_s <= entry.now_s <= until_s]
-    assert abs(len([e for e in recording.entries() if isinstance(e, Entry)]) - len(kept)) <= 1
+    assert abs(len([e for e in recording.entries() if isinstance(e, RecordedCall)]) - len(kept)) <= 1
     (gap,) = recording.gaps
     assert gap.from_s == pytest.approx(from_s, abs=0.05)
     assert gap.until_s == pytest.approx(until_s, abs=0.05)
@@ -164,7 +164,7 @@ def test_a_file_cut_anywhere_gives_what_was_written_and_says_where_it_ends(whole
     for cut in sorted(rng.sample(range(first[0] + len(first[1]), len(data)), 25)):
         path.write_bytes(data[:cut])
         recording = Recording.open(path)
-        got = [entry for entry in recording.entries() if isinstance(entry, Entry)]
+        got = [entry for entry in recording.entries() if isinstance(entry, RecordedCall)]
         assert got == made[: len(got)]
         if len(got) < len(made):
             assert f"it ends at {got[-1].now_s:.1f} s" in recording.told_gaps()

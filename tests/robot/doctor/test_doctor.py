@@ -17,7 +17,7 @@ from lemtomap.robot.devices.wire import Wire
 from lemtomap.robot.doctor import examine as doctor
 from lemtomap.robot.doctor.diagnosis import Verdict, judge_base, judge_laser
 from lemtomap.sim import worlds
-from lemtomap.sim.base import BaseConfig, BatteryConfig
+from lemtomap.sim.base import BaseConfig, SimulatedBattery
 from lemtomap.sim.errors import Unplugged
 from lemtomap.sim.faults import Faults, LinkFaults
 from lemtomap.sim.gyro import GyroConfig
@@ -57,7 +57,7 @@ def test_a_healthy_robot_is_called_healthy(healthy):
 
 def test_a_tired_battery_and_a_drifting_gyro_are_named():
     config = SimConfig(
-        base=BaseConfig(battery=BatteryConfig(start_share=0.1), gyro=GyroConfig(bias_sigma_dps=0.5))
+        base=BaseConfig(battery=SimulatedBattery(start_share=0.1), gyro=GyroConfig(bias_sigma_dps=0.5))
     )
     base, _ = told_by(config)
     said = bad(judge_base(base))

@@ -17,9 +17,9 @@ from lemtomap.robot.motion.safety import Reason
 from lemtomap.robot.runs.lockstep import run_lockstep
 from lemtomap.se2 import between, compose
 from lemtomap.sim import worlds
-from lemtomap.sim.route import RoutePlanner
+from lemtomap.sim.route import FloorRoutePlanner
 from lemtomap.sim.simulator import Simulator
-from lemtomap.sim.tours import Tour
+from lemtomap.sim.tours import ScriptedTour
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import Bumped, NothingKnownHere
 from lemtomap.topo.file.store import TopoStore
@@ -73,7 +73,7 @@ def mapped(tmp_path_factory):
     robot, born = SimRobot(world, seed=1), {}
     mapping = Mapping(robot, path, born)
     mapping.take(robot.stand(1.0))
-    mapping.take(robot.drive(Tour(RoutePlanner(world.raster).through(ROUND))))
+    mapping.take(robot.drive(ScriptedTour(FloorRoutePlanner(world.raster).through(ROUND))))
     mapping.step.close()
     robot.close()
     return world, path, born
@@ -88,7 +88,7 @@ def test_a_carried_robot_says_so_and_finds_itself_again(mapped):
     mapping.take(robot.stand(1.0))
     assert mapping.view.lost
     assert mapping.view.quality == 0.0
-    way = Tour(RoutePlanner(world.raster).path((5.4, 3.0), (9.0, 5.0)))
+    way = ScriptedTour(FloorRoutePlanner(world.raster).path((5.4, 3.0), (9.0, 5.0)))
     assert mapping.take(robot.drive(way), until_found=True)
     old = set(mapping.view.T_grid_node) & known
     anchored = [node_id for node_id in old if mapping.step.mapper.topo.standing(node_id).anchored]
@@ -98,7 +98,7 @@ def test_a_carried_robot_says_so_and_finds_itself_again(mapped):
     mapping.take(robot.stand(0.3))
     assert mapping.view.lost
     assert any("lost" in text for text in mapping.told)
-    way = Tour(RoutePlanner(world.raster).path((13.5, 5.2), (10.0, 5.0)))
+    way = ScriptedTour(FloorRoutePlanner(world.raster).path((13.5, 5.2), (10.0, 5.0)))
     assert mapping.take(robot.drive(way), until_found=True)
     assert mapping.off_m(mapping.view.associated_id) < 0.1
     joined = set(mapping.step.mapper.topo.graph.reach(mapping.view.associated_id, 1e9))
@@ -145,7 +145,7 @@ def test_a_part_that_nothing_joins_is_joined_when_the_robot_comes_by(mapped, tmp
     robot.put(np.array([13.0, 5.0, 3.1]))
     mapping = Mapping(robot, own, dict(born))
     mapping.take(robot.stand(1.0))
-    mapping.take(robot.drive(Tour(RoutePlanner(world.raster).path((13.0, 5.0), (3.0, 5.0)))))
+    mapping.take(robot.drive(ScriptedTour(FloorRoutePlanner(world.raster).path((13.0, 5.0), (3.0, 5.0)))))
     mapper = mapping.step.mapper.topo
     assert not mapping.view.lost
     assert set(born) <= set(mapper.graph.reach(mapping.view.associated_id, 1e9))

@@ -7,7 +7,7 @@ import pytest
 from lemtomap.errors import BadSetting
 from lemtomap.nav.types import NavOutput, NavState
 from lemtomap.robot.exchange import MissionState
-from lemtomap.robot.missions.missions import GoTo, Moment, parse_mission
+from lemtomap.robot.missions.missions import GoTo, MissionInput, parse_mission
 from lemtomap.robot.missions.nodes_by_distance import farthest_node
 from lemtomap.topo.events import LevelChanged
 from lemtomap.types import RouteEdge, Twist
@@ -30,7 +30,7 @@ class Line:
 
 def moment(state, cycle, here=3, text=""):
     output = NavOutput(0.1 * cycle, Twist(), state, text=text, cycle=cycle)
-    return Moment(0.1 * cycle, SimpleNamespace(associated_id=here), Line(), output, None, None)
+    return MissionInput(0.1 * cycle, SimpleNamespace(associated_id=here), Line(), output, None, None)
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from lemtomap.errors import BadSetting
 from lemtomap.robot.motion.teleop import (
     HOLD_S,
     REST,
+    KeyListener,
     Keys,
-    Listener,
     driven_by_hand,
 )
 from lemtomap.types import Twist
@@ -40,7 +40,7 @@ def test_nobody_drives_without_a_terminal(monkeypatch):
     monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
     with (
         pytest.raises(BadSetting, match="terminal"),
-        driven_by_hand(Listener(lambda *_: None, lambda _: None, lambda: None), lambda: 0.0),
+        driven_by_hand(KeyListener(lambda *_: None, lambda _: None, lambda: None), lambda: 0.0),
     ):
         pass
 
@@ -50,7 +50,7 @@ def test_a_digit_tells_the_level_and_q_ends(monkeypatch):
     heard, wishes, ended = [], [], threading.Event()
     with os.fdopen(theirs, "r") as terminal:
         monkeypatch.setattr("sys.stdin", terminal)
-        listener = Listener(lambda wish, _: wishes.append(wish), heard.append, ended.set)
+        listener = KeyListener(lambda wish, _: wishes.append(wish), heard.append, ended.set)
         with driven_by_hand(listener, lambda: 0.0):
             os.write(ours, b"w2q")
             assert ended.wait(10.0)
@@ -69,7 +69,7 @@ def test_arrows_drive_even_when_their_characters_come_at_once(monkeypatch):
             if wish.v_mps > 0.0:
                 driven.set()
 
-        with driven_by_hand(Listener(offer, lambda _: None, lambda: None), lambda: 0.0):
+        with driven_by_hand(KeyListener(offer, lambda _: None, lambda: None), lambda: 0.0):
             os.write(ours, b"\x1b[A")
             assert driven.wait(10.0)
     os.close(ours)

@@ -20,12 +20,12 @@ from lemtomap import se2
 from lemtomap.nav.types import Goal, NavState
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.exchange import MissionState
-from lemtomap.robot.missions.missions import Moment, Order
+from lemtomap.robot.missions.missions import MissionInput, Order
 from lemtomap.robot.runs.warmup import warm_up
 from lemtomap.sim import worlds
 from lemtomap.sim.movers import Person
 from lemtomap.sim.raster import clearance_m
-from lemtomap.sim.route import RoutePlanner
+from lemtomap.sim.route import FloorRoutePlanner
 from lemtomap.sim.world import World
 from tools.bench.nav_parts.lead import Rig, rig_of, round_trip
 
@@ -134,7 +134,7 @@ class GoalTour:
             self._pushed += pushes(self._rig)
         self._touching = truth.touching
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Give the next goal when the last one is over."""
         if self._now is not None and not self._over(self._now, moment):
             return Order(MissionState.RUNNING, f"goal {len(self.done) + 1}")
@@ -147,7 +147,7 @@ class GoalTour:
         self._cycle, self._pushed = moment.output.cycle, 0
         return Order(MissionState.RUNNING, f"goal {len(self.done) + 1}", goal)
 
-    def _over(self, verdict: Verdict, moment: Moment) -> bool:
+    def _over(self, verdict: Verdict, moment: MissionInput) -> bool:
         late = moment.now_s - self._begun[0] > GOAL_LIMIT_S
         ended = moment.output.state in {NavState.ARRIVED, NavState.FAILED}
         if moment.output.cycle <= self._cycle or not (ended or late):
@@ -183,7 +183,7 @@ def pushes(rig: Rig) -> bool:
 
 def with_people(world: World, people: int, seed: int) -> World:
     """Return the building with people who walk to and fro between random places."""
-    planner, rng = RoutePlanner(world.raster), np.random.default_rng(seed)
+    planner, rng = FloorRoutePlanner(world.raster), np.random.default_rng(seed)
     places = planner.places((world.spawn[0], world.spawn[1]), 3.0)
     walkers: list[Person] = []
     while len(walkers) < people:

@@ -19,13 +19,13 @@ from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.core import RobotCore
 from lemtomap.robot.devices.depth import DepthFeed
 from lemtomap.robot.exchange import Ended, MissionState
-from lemtomap.robot.missions.missions import Mission, Moment, Order
+from lemtomap.robot.missions.missions import Mission, MissionInput, Order
 from lemtomap.robot.runs.lockstep import run_lockstep
 from lemtomap.robot.runs.simulated import camera_of
 from lemtomap.se2 import Pose
-from lemtomap.sim.route import RoutePlanner
+from lemtomap.sim.route import FloorRoutePlanner
 from lemtomap.sim.simulator import Simulator
-from lemtomap.sim.tours import Tour
+from lemtomap.sim.tours import ScriptedTour
 from lemtomap.sim.world import World
 from lemtomap.types import Twist
 
@@ -36,10 +36,10 @@ PLACES_M = 3.0  # a tour passes within about this much of every place
 class Led:
     """A mission that is over when the leader has come to the end of his path."""
 
-    def __init__(self, tour: Tour) -> None:
+    def __init__(self, tour: ScriptedTour) -> None:
         self._tour = tour
 
-    def step(self, moment: Moment) -> Order:  # noqa: ARG002 - the leader watches the path
+    def step(self, moment: MissionInput) -> Order:  # noqa: ARG002 - the leader watches the path
         """Wait."""
         return Order(MissionState.DONE if self._tour.done else MissionState.RUNNING, "led")
 
@@ -68,7 +68,7 @@ class Rig:
 
     def lead(self, path: NDArray[np.float64]) -> Ended:
         """Take the robot along a path, float64 (N, 2), world metres."""
-        tour = Tour(path)
+        tour = ScriptedTour(path)
 
         def pull(now_s: float) -> None:
             v_mps, w_radps = tour.command(self.simulator.truth().T_world_base)
@@ -108,7 +108,7 @@ def rig_of(world: World, seed: int, folder: Path, *, depth: bool = False) -> Rig
 
 def round_trip(world: World, spacing_m: float = PLACES_M) -> NDArray[np.float64]:
     """Return a path through every place of a building, nearest first by the way, and back to the start."""
-    planner = RoutePlanner(world.raster)
+    planner = FloorRoutePlanner(world.raster)
     here = home = (world.spawn[0], world.spawn[1])
     left = planner.places(home, spacing_m)
     legs = []

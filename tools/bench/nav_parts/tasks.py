@@ -20,7 +20,7 @@ from lemtomap.robot.baseline import build_metric_core
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.core import RobotCore
 from lemtomap.robot.exchange import MissionState
-from lemtomap.robot.missions.missions import Moment, Order
+from lemtomap.robot.missions.missions import MissionInput, Order
 from lemtomap.robot.runs.metric import grid_of
 from lemtomap.robot.runs.warmup import warm_up
 from lemtomap.sim import worlds
@@ -74,7 +74,7 @@ class Legs:
         self._begun = (0.0, 0.0, 0)
         self._cycle = 0
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Give the next goal when the last one is over."""
         if self._leg is not None and not self._watch(self._leg, moment):
             return Order(MissionState.RUNNING, f"leg {len(self.done)}")
@@ -88,7 +88,7 @@ class Legs:
         self._cycle = moment.output.cycle
         return Order(MissionState.RUNNING, f"leg {len(self.done)}", self._goal)
 
-    def _watch(self, leg: Leg, moment: Moment) -> bool:
+    def _watch(self, leg: Leg, moment: MissionInput) -> bool:
         """Take one cycle; True when the leg is over."""
         if moment.output.cycle <= self._cycle:
             return False
@@ -108,7 +108,7 @@ class Legs:
         self._leg = None
         return True
 
-    def _note_end(self, number: int, moment: Moment) -> None:
+    def _note_end(self, number: int, moment: MissionInput) -> None:
         view = moment.view
         node_id = self._goal.node_id if self._goal.node_id in view.T_grid_node else view.associated_id
         T_grid_goal = se2.compose(view.T_grid_node[node_id], [*self._goal.p_node, 0.0])

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from lemtomap.nav.types import Goal, NavState
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.exchange import MissionState
-from lemtomap.robot.missions.missions import Moment, Order
+from lemtomap.robot.missions.missions import MissionInput, Order
 from lemtomap.robot.runs.warmup import warm_up
 from lemtomap.se2 import Pose
 from lemtomap.sim import furniture, worlds
 from lemtomap.sim.errors import BadWorld
 from lemtomap.sim.movers import NOWHERE
-from lemtomap.sim.route import RoutePlanner, path_length_m
+from lemtomap.sim.route import FloorRoutePlanner, path_length_m
 from lemtomap.sim.simulator import Truth
 from lemtomap.sim.world import (
     Box,
@@ -86,7 +86,7 @@ class Drive:
     _touched_s: float = -math.inf
     _counted: int = 0
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Give the goal, watch, and end with the navigator's verdict."""
         truth = self.rig.simulator.truth()
         if math.isnan(self.begun_s):
@@ -181,7 +181,7 @@ def barred(raster: Raster, pose: Pose2, half_m: float) -> Raster:
     return replace(raster, occupied=raster.occupied | wall, free=raster.free & ~wall)
 
 
-def length_m(planner: RoutePlanner, a: Point, b: Point) -> float:
+def length_m(planner: FloorRoutePlanner, a: Point, b: Point) -> float:
     """Return the way between two points, inf if there is none."""
     try:
         path = planner.path((a[0], a[1]), (b[0], b[1]))
@@ -199,7 +199,7 @@ def bench_doors(name: str, seed: int, count: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         rig = rig_of(replace(world, movers=(*world.movers, *doors.all)), seed, Path(folder))
         rig.lead(round_trip(world))
-        planner = RoutePlanner(world.raster)
+        planner = FloorRoutePlanner(world.raster)
         for _ in range(50 * count):
             if len(rows) >= 2 * count:
                 break
@@ -212,7 +212,9 @@ def bench_doors(name: str, seed: int, count: int) -> None:
         print(f"{kind:12} {right} of {len(mine)} right; s: " + ", ".join(f"{time_s:.1f}" for time_s in times))
 
 
-def _one_door(rig: Rig, doors: Doors, planner: RoutePlanner, node_id: int) -> list[tuple[str, bool, float]]:
+def _one_door(
+    rig: Rig, doors: Doors, planner: FloorRoutePlanner, node_id: int
+) -> list[tuple[str, bool, float]]:
     """Bar the way to one node; return (what, right, time s) of each drive."""
     here = rig.simulator.truth().T_world_base
     there = rig.T_world_node[node_id]
@@ -225,7 +227,7 @@ def _one_door(rig: Rig, doors: Doors, planner: RoutePlanner, node_id: int) -> li
     if fitting is None:
         return []
     door, pose = fitting
-    long_m = length_m(RoutePlanner(barred(raster, pose, DOOR_HALF_M[door])), here, there)
+    long_m = length_m(FloorRoutePlanner(barred(raster, pose, DOOR_HALF_M[door])), here, there)
     if long_m < 1.5 * short_m + 3.0 or (math.isfinite(long_m) and long_m > 100.0):
         return []  # the barrier is no barrier, or the way round is too long for a bench
     doors.shut(door, pose)
@@ -255,7 +257,7 @@ class _Pause:
     def __init__(self, wait_s: float) -> None:
         self._wait_s, self._until_s = wait_s, math.nan
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Let the decay pass."""
         if math.isnan(self._until_s):
             self._until_s = moment.now_s + self._wait_s
@@ -273,7 +275,7 @@ def bench_obstacles(name: str, seed: int, count: int, *, depth: bool) -> None:
     with tempfile.TemporaryDirectory() as folder:
         rig = rig_of(replace(world, movers=(*world.movers, *things)), seed, Path(folder), depth=depth)
         rig.lead(round_trip(world))
-        planner = RoutePlanner(world.raster)
+        planner = FloorRoutePlanner(world.raster)
         for _ in range(50 * count):
             if drives >= 2 * count:
                 break
@@ -304,7 +306,7 @@ def bench_obstacles(name: str, seed: int, count: int, *, depth: bool) -> None:
 
 
 def _beside(
-    rig: Rig, planner: RoutePlanner, here: Point, there: Point, rng: np.random.Generator
+    rig: Rig, planner: FloorRoutePlanner, here: Point, there: Point, rng: np.random.Generator
 ) -> Pose2 | None:
     """Return a place near the middle of the way where a thing leaves room to pass; None if there is none."""
     path = planner.path((here[0], here[1]), (there[0], there[1]))
@@ -316,7 +318,7 @@ def _beside(
         x, y, yaw = across(path, float(share))
         aside = float(rng.uniform(-0.25, 0.25))
         pose = x - aside * math.sin(yaw), y + aside * math.cos(yaw), yaw
-        past = RoutePlanner(barred(raster, pose, THING_HALF_M))
+        past = FloorRoutePlanner(barred(raster, pose, THING_HALF_M))
         if length_m(past, here, there) < way_m + ROUND_M:
             return pose
     return None

@@ -19,7 +19,7 @@ from lemtomap.robot.exchange import Exchange, TimedScan
 from lemtomap.se2 import Pose
 from lemtomap.sim.errors import Unplugged
 from lemtomap.sim.simulator import Simulator
-from lemtomap.sim.tours import Tour, base_command
+from lemtomap.sim.tours import ScriptedTour, base_command
 from lemtomap.sim.world import World
 
 STEP_S = 0.02  # one feedback packet
@@ -52,7 +52,7 @@ class SimRobot:
         """Where the robot truly is."""
         return self.simulator.truth().T_world_base
 
-    def drive(self, tour: Tour, limit_s: float = math.inf) -> Iterator[Seen]:
+    def drive(self, tour: ScriptedTour, limit_s: float = math.inf) -> Iterator[Seen]:
         """Follow a way to its end, or until the time is up."""
         limit_s = min(limit_s, 60.0 + 4.0 * tour.length_m / tour.config.speed_mps)
         end_s = self.now_s + limit_s

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from lemtomap.se2 import Pose
-from lemtomap.sim.route import RoutePlanner
-from lemtomap.sim.tours import Tour
+from lemtomap.sim.route import FloorRoutePlanner
+from lemtomap.sim.tours import ScriptedTour
 from lemtomap.sim.world import World
 from tools.bench.parts.sim_maps import JudgedMap, load_born
 from tools.bench.parts.sim_robot import Seen, SimRobot
@@ -116,13 +116,13 @@ def _search(robot: SimRobot, world: World, rng: np.random.Generator, limit_s: fl
     yield from robot.drive(_wander(world, robot.T_world_base, rng), 2.0 * limit_s)
 
 
-def _wander(world: World, T_world_base: Pose, rng: np.random.Generator) -> Tour:
+def _wander(world: World, T_world_base: Pose, rng: np.random.Generator) -> ScriptedTour:
     """Return a way through random places from here."""
-    planner = RoutePlanner(world.raster)
+    planner = FloorRoutePlanner(world.raster)
     here = (float(T_world_base[0]), float(T_world_base[1]))
     places = planner.places(here, 1.0)
     goals = [places[index] for index in rng.integers(len(places), size=3)]
-    return Tour(
+    return ScriptedTour(
         planner.through([here, *[goal for goal in goals if np.hypot(*np.subtract(goal, here)) > 1.0]])
     )
 
@@ -157,7 +157,7 @@ def _known_place(path: Path, world: World, rng: np.random.Generator) -> Pose:
 def _place_at(path: Path, world: World, rng: np.random.Generator, least_m: float, most_m: float) -> Pose:
     """Return a random pose within reach of the building's start and so far from the nearest known node."""
     nodes = np.array([T[:2] for T in load_born(path).values()])
-    places = np.array(RoutePlanner(world.raster).places(world.spawn[:2], 0.5))
+    places = np.array(FloorRoutePlanner(world.raster).places(world.spawn[:2], 0.5))
     gap_m = np.hypot(*(places[:, None] - nodes[None]).transpose(2, 0, 1)).min(axis=1)
     chosen = places[rng.choice(np.flatnonzero((gap_m >= least_m) & (gap_m <= most_m)))]
     return np.array([*chosen, rng.uniform(-np.pi, np.pi)])

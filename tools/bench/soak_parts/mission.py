@@ -8,7 +8,7 @@ from lemtomap.robot.exchange import MissionState
 from lemtomap.robot.missions.missions import (
     Explore,
     GoTo,
-    Moment,
+    MissionInput,
     Order,
 )
 from lemtomap.topo.file.reader import TopoReader
@@ -45,7 +45,7 @@ class ExploreThenGoals:
         """The goal that is being driven to; None while exploring."""
         return self._errand if self._leg is not None else None
 
-    def step(self, moment: Moment) -> Order:
+    def step(self, moment: MissionInput) -> Order:
         """Return what to do now; never over."""
         if self._explore is not None:
             order = self._explore.step(moment)
@@ -65,7 +65,7 @@ class ExploreThenGoals:
         order = self._leg.step(moment)
         return Order(MissionState.RUNNING, order.text, order.goal)
 
-    def _drawn(self, moment: Moment) -> int:
+    def _drawn(self, moment: MissionInput) -> int:
         """Return a node of the map other than the one here."""
         graph = moment.graph
         if not isinstance(graph, TopoReader):

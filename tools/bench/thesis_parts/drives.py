@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from lemtomap.se2 import Pose, between
 from lemtomap.sim import worlds
 from lemtomap.sim.carmen import record_tour
-from lemtomap.sim.route import RoutePlanner
+from lemtomap.sim.route import FloorRoutePlanner
 from lemtomap.sim.simulator import Simulator
-from lemtomap.sim.tours import Tour, TourConfig, plan_tour
+from lemtomap.sim.tours import ScriptedTour, TourConfig, plan_tour
 from lemtomap.sim.world import World
 from tools.truth.tour_error import error_m, truth_and_odometry
 
@@ -51,12 +51,12 @@ class Drive:
         return path
 
 
-def round_tour(world: World, duration_s: float) -> Tour:
+def round_tour(world: World, duration_s: float) -> ScriptedTour:
     """Return a drive of at least so long: out through the building, home the shortest way, out again."""
     config = TourConfig(speed_mps=SPEED_MPS, spacing_m=SPACING_M)
     out = plan_tour(world, OUT_SHARE * duration_s, config).path
-    home = RoutePlanner(world.raster).path(tuple(out[-1]), tuple(out[0]))
-    return Tour(np.concatenate([out, home, out]), config)
+    home = FloorRoutePlanner(world.raster).path(tuple(out[-1]), tuple(out[0]))
+    return ScriptedTour(np.concatenate([out, home, out]), config)
 
 
 def wrong_closures(log: Path, picture: Path) -> int:

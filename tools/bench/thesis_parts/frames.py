@@ -8,7 +8,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.nav.types import Sighting
+from lemtomap.nav.types import ObstacleSighting
 from lemtomap.types import (
     GridView,
     MapView,
@@ -26,7 +26,7 @@ class Frame:
     """Time since the first scan."""
     odometry: Odometry
     scan: Scan
-    sighting: Sighting
+    sighting: ObstacleSighting
     update: SlamUpdate | None = None
     grid: GridView | None = None
     """Only when the metric map was published anew."""
