@@ -15,7 +15,7 @@ from lemtomap.errors import BadLog
 
 LONGEST_LINE = 1_000_000  # characters; a scan of 1081 beams takes 10,000
 MOST_BYTES = 1_000_000_000  # of text
-MOST_PACKED = 200  # bytes of text from one byte of file; measured numbers pack 5 to 10 times
+MOST_PACKED = 100  # bytes of text from one byte of file; measured numbers pack 5 to 10 times
 FREE_BYTES = 8_000_000  # that may come out of fewer bytes: a robot that stood packs well
 PEEK = 64
 
@@ -91,7 +91,7 @@ def lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _refuse_non_file(path: Path, *, packed: bool) -> None:
-    """Raise BadLog for a pipe or a device, which may never end, a folder, and what is too long as it stands."""
+    """Raise BadLog for a pipe or a device, which may never end, a folder, and what is too long."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise BadLog("is no file")

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from tests.robot.carmen_lines import flaser, robotlaser1, written
 
 from lemtomap.errors import BadLog, BadSetting
 from robot.logs import open_log
+from tests.robot.carmen_lines import flaser, robotlaser1, written
 
 URG_DEG = 360.0 / 1024.0
 
@@ -124,7 +124,7 @@ def test_a_laser_line_that_contradicts_itself_is_skipped_and_refused_when_all_do
     assert any(
         "broken lines are skipped (line 2: a scan of 181 beams is not 180 degrees" in r for r in log.remarks
     )
-    with pytest.raises(BadLog, match=":1: a scan of 181 beams .* --field-of-view"):
+    with pytest.raises(BadLog, match=r":1: a scan of 181 beams .* --field-of-view"):
         open_log(written(tmp_path, odd))
 
 

@@ -5,11 +5,11 @@ import lzma
 import os
 
 import pytest
-from tests.robot.carmen_lines import flaser
 
 from lemtomap.errors import BadLog
 from robot.cli import main
 from robot.logs import open_log, text
+from tests.robot.carmen_lines import flaser
 
 LINES = "".join(flaser([1.0] * 180, stamp=f"{k}.000000") + "\n" for k in range(5))
 
@@ -53,7 +53,7 @@ def test_a_bomb_is_refused_after_its_first_megabytes(tmp_path, monkeypatch, suff
     head = {".gz": gzip.compress, ".xz": lzma.compress}[suffix](os.urandom(20_000).hex().encode() + b"\n")
     path.write_bytes(head + path.read_bytes())  # what is honest at the beginning does not pay for the rest
     unpacked = 0
-    with pytest.raises(BadLog, match="bomb.*times its size") as caught:  # noqa: PT012 - the loop is the reader
+    with pytest.raises(BadLog, match=r"bomb.*times its size") as caught:  # noqa: PT012 - the loop is the reader
         for _, line in text.lines(path):
             unpacked += len(line)
     assert str(path) in str(caught.value)

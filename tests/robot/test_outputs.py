@@ -24,7 +24,7 @@ def test_trajectory_has_one_tum_line_per_scan_in_order_even_when_stamps_go_back(
 
 def test_grid_is_what_map_server_reads(tmp_path):
     occupancy = np.array([[-1, 0, 100], [25, 50, 65]], dtype=np.int8)  # row 0 lies lowest
-    outputs.write_grid(tmp_path, GridView(0.0, occupancy, 0.05, (-1.5, 2.0)))
+    outputs.write_grid(tmp_path, GridView(0.0, occupancy, 0.05, (-1.5, 2.0)), np.zeros(3))
     data = (tmp_path / "grid.pgm").read_bytes()
     assert data == b"P5\n3 2\n255\n" + bytes([254, 205, 0, 205, 254, 0])
     told = yaml.safe_load((tmp_path / "grid.yaml").read_text())
@@ -38,6 +38,15 @@ def test_grid_is_what_map_server_reads(tmp_path):
         "free_thresh": 0.196,
     }
     assert told["free_thresh"] < (255 - outputs.GREY_UNKNOWN) / 255, "unknown must not decode as free"
+
+
+def test_the_origin_lays_the_grid_into_the_frame_of_the_trajectory(tmp_path):
+    grid = GridView(0.0, np.zeros((2, 3), np.int8), 0.05, (-1.5, 2.0))
+    T_map_grid = np.array([10.0, 20.0, np.pi / 2])
+    outputs.write_grid(tmp_path, grid, T_map_grid)
+    told = yaml.safe_load((tmp_path / "grid.yaml").read_text())
+    assert told["origin"] == pytest.approx([8.0, 18.5, np.pi / 2], abs=1e-6)
+    assert "turned by 90.0 degrees" in outputs.told_of_grid(tmp_path, grid, T_map_grid)
 
 
 def test_summary_is_plain_json_whatever_numbers_come(tmp_path):
