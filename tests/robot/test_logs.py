@@ -121,7 +121,8 @@ def test_remarks_come_one_for_each_kind_with_count_and_first_place(tmp_path):
         (np.zeros(20), False),
         (np.arange(20, 0, -1) * 0.2, False),
         (np.arange(20) * 0.2 + 1e9 * (np.arange(20) > 9), False),  # set on the way
-        (np.arange(20) * 0.2 - 20.0 * (np.arange(20) > 9), False),
+        (np.arange(200) * 0.2 - 15.0 * (np.arange(200) > 99), False),
+        (np.arange(20) * 0.02 + 0.4 * (np.arange(20) % 2), False),  # to and fro
         (np.arange(20) * 1e-3, False),  # 60 m/s
         (np.arange(20) * 200.0, False),  # milliseconds
     ],
