@@ -70,7 +70,7 @@ def map_(
             metavar="DEGREES",
             min=1.0,
             max=360.0,
-            help="what the laser of a CARMEN log covers; default: as the log says, or by its beams",
+            help="what the laser of a CARMEN log covers; default: as the log says, else by its beams",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="same log and seed: same map, byte for byte")] = 0,

@@ -75,11 +75,11 @@ class _Reader:
 
     def take(self, place: int, line: str) -> None:
         """Read one line; a broken one is noted."""
-        name = line[: line.find(" ")] if " " in line else line.strip()
+        name = _name(line)
         try:
             if name in self.records:
                 self.records[name].append(self._record(name, place, line.split()))
-            elif name == "ODOM" and not any(self.records[kind] for kind in POSED):
+            elif name == "ODOM" and self.kind() == RAW:
                 fields = line.split()
                 _refuse_other_length(name, fields, SHORTEST_MESSAGE)
                 self.odometry.add(numbers.stamp(fields[-STAMPS]), numbers.pose(fields[1:4]))
@@ -90,6 +90,13 @@ class _Reader:
             self.first_broken = self.first_broken or f":{place}: {reason}"
         except UnknownFan as reason:
             raise BadLog(f"{self.path}:{place}: {reason}: {ASK}") from None
+
+    def end(self, place: int, last: str) -> None:
+        """Note a last line that has no end and is too short for any message of a robot."""
+        read = _name(last) in ({"PARAM", "SYNC", *self.records} | ({"ODOM"} if self.kind() == RAW else set()))
+        short = 0 < len(last.split()) < SHORTEST_MESSAGE and not last.endswith("\n")
+        if short and not read and not last.startswith("#"):
+            self.remarks.add(BROKEN, place, "the file ends in the middle of it")
 
     def kind(self) -> str:
         """Return the kind of laser line the log is made of."""
@@ -190,7 +197,7 @@ def read(path: Path, lines: Iterable[tuple[int, str]], field_of_view_rad: float 
     for place, raw in lines:
         line = raw.lstrip("\ufeff \t")
         reader.take(place, line)
-    _note_cut_end(place, line, reader.remarks)
+    reader.end(place, line)
     kind = reader.kind()
     records = reader.records[kind]
     if not records:
@@ -207,6 +214,11 @@ def read(path: Path, lines: Iterable[tuple[int, str]], field_of_view_rad: float 
     return RecordedLog(path, records, reader.remarks, infer_no_return_m(records))
 
 
+def _name(line: str) -> str:
+    """Return the message's name."""
+    return line[: line.find(" ")] if " " in line else line.strip()
+
+
 def _fan_of_line(beams: int, start_rad: float, fov_rad: float, step_rad: float) -> Fan:
     """Return the fan of a line that tells it; raises BrokenLine where it contradicts itself."""
     try:
@@ -218,11 +230,3 @@ def _fan_of_line(beams: int, start_rad: float, fov_rad: float, step_rad: float) 
 def _refuse_other_length(name: str, fields: list[str], needed: int) -> None:
     if len(fields) != needed:
         raise BrokenLine(f"cut in the middle? {name} promises {needed} fields, the line has {len(fields)}")
-
-
-def _note_cut_end(place: int, last: str, remarks: Remarks) -> None:
-    """Note a last line that has no end and is too short for any message of a robot."""
-    name = last.split(" ", 1)[0]
-    spoken = last.startswith("#") or name in {"PARAM", "SYNC"} or name in {*POSED, RAW, "ODOM"}
-    if last.strip() and not last.endswith("\n") and not spoken and len(last.split()) < SHORTEST_MESSAGE:
-        remarks.add(BROKEN, place, "the file ends in the middle of it")

@@ -15,7 +15,7 @@ from lemtomap.errors import BadLog
 
 LONGEST_LINE = 1_000_000  # characters; a scan of 1081 beams takes 10,000
 MOST_BYTES = 1_000_000_000  # of text
-MOST_PACKED = 200  # bytes of text from one byte of file; measured numbers pack 5 to 10 times
+MOST_PACKED = 100  # bytes of text from one byte of file; measured numbers pack 5 to 10 times
 FREE_BYTES = 8_000_000  # that may come out of fewer bytes: a robot that stood packs well
 PEEK = 64
 

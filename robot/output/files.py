@@ -32,8 +32,8 @@ FREE_PERCENT, OCCUPIED_PERCENT = (
 
 
 GRID_COMMENT = (
-    "# The grid at the end of the drive. The origin (x, y in metres, yaw in radians) is the pose of the\n"
-    "# image's lower left corner in the frame of trajectory.tum; who ignores the yaw shows it turned.\n"
+    "# The grid at the end of the drive. The origin (x, y in metres, yaw in radians) is the pose of\n"
+    "# the image's lower left corner in the frame of trajectory.tum; read without its yaw it lies turned.\n"
 )
 
 

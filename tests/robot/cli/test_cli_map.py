@@ -5,6 +5,7 @@ import sqlite3
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 
 from lemtomap import se2
@@ -12,6 +13,7 @@ from lemtomap.robot.cli.main import main
 
 WIDTH_M, DEPTH_M = 7.0, 5.0
 SCANS = 60
+DRIVE = [(1.0 + 0.06 * k, 1.0 + 0.6 * np.sin(k / 10), 0.4 * np.cos(k / 10)) for k in range(SCANS)]
 
 
 def flaser(x, y, yaw, stamp_s):
@@ -33,8 +35,7 @@ def flaser(x, y, yaw, stamp_s):
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
     path = tmp_path_factory.mktemp("log") / "room.clf"
-    drive = [(1.0 + 0.06 * k, 1.0 + 0.6 * np.sin(k / 10), 0.4 * np.cos(k / 10)) for k in range(SCANS)]
-    path.write_text("".join(flaser(*pose, 976052857.25 + 0.2 * k) for k, pose in enumerate(drive)))
+    path.write_text("".join(flaser(*pose, 976052857.25 + 0.2 * k) for k, pose in enumerate(DRIVE)))
     return path
 
 
@@ -60,6 +61,51 @@ def test_the_trajectory_is_the_drive(out):
     k = SCANS - 1
     truth = se2.between([1.0, 1.0, 0.4], [1.0 + 0.06 * k, 1.0 + 0.6 * np.sin(k / 10), 0.4 * np.cos(k / 10)])
     assert se2.between(first, last) == pytest.approx(truth, abs=0.05)
+
+
+def test_the_grid_lies_over_the_trajectory(out):
+    told = yaml.safe_load((out / "grid.yaml").read_text())
+    rows, cols = np.nonzero(np.flipud(np.asarray(Image.open(out / "grid.pgm"))) == 0)
+    corner = np.stack([cols + 0.5, rows + 0.5], axis=-1) * told["resolution"]
+    first = np.loadtxt(out / "trajectory.tum")[0]
+    T_world_map = se2.compose(DRIVE[0], se2.inverse([first[1], first[2], 2 * np.arctan2(first[6], first[7])]))
+    walls = se2.transform(se2.compose(T_world_map, told["origin"]), corner)
+    off = np.min(np.abs([walls[:, 0], walls[:, 0] - WIDTH_M, walls[:, 1], walls[:, 1] - DEPTH_M]), axis=0)
+    off_pillar = np.abs(np.hypot(walls[:, 0] - 4.5, walls[:, 1] - 3.5) - 0.3)
+    assert len(walls) > 200
+    assert np.quantile(np.minimum(off, off_pillar), 0.95) < 0.1
+
+
+def test_without_a_clock_no_time_and_no_rate_is_told(tmp_path, capsys):
+    lines = [flaser(*pose, 5.0) for pose in DRIVE[:6]]
+    (tmp_path / "still.clf").write_text("".join(lines))
+    assert main(["map", str(tmp_path / "still.clf"), "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr()
+    assert "real time" not in said.out
+    assert "the stamps are no clock" in said.err
+    assert (
+        not {"log_s", "realtime_factor"} & json.loads((tmp_path / "out" / "summary.json").read_text()).keys()
+    )
+
+
+def test_the_user_is_told_in_which_frame_the_grid_lies_and_what_was_odd(log, tmp_path, capsys):
+    lines = log.read_text().splitlines(keepends=True)[:8]
+    (tmp_path / "odd.LOG").write_text("".join([*lines[:4], lines[4][:200] + "\n", *lines[5:]]))
+    assert main(["map", str(tmp_path / "odd.LOG"), "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr()
+    assert "lays it into the frame of trajectory.tum" in said.out
+    assert said.err.count("broken lines are skipped (line 5: ") == 1
+
+
+def test_a_field_of_view_can_be_given(tmp_path, capsys):
+    line = flaser(*DRIVE[0], 5.0).replace("FLASER 181", "FLASER 179").split(" ")
+    (tmp_path / "a.clf").write_text(" ".join(line[:181] + line[183:]))
+    arguments = ["map", str(tmp_path / "a.clf"), "--out", str(tmp_path / "out")]
+    assert main(arguments) == 2
+    assert "--field-of-view" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert main([*arguments, "--field-of-view", "178"]) == 0
+    assert main([*arguments, "--field-of-view", "400"]) == 2
 
 
 def test_summary_map_and_picture_agree(out):

@@ -41,6 +41,15 @@ def test_grid_is_what_map_server_reads(tmp_path):
     assert told["free_thresh"] < (255 - outputs.GREY_UNKNOWN) / 255, "unknown must not decode as free"
 
 
+def test_the_origin_lays_the_grid_into_the_frame_of_the_trajectory(tmp_path):
+    grid = GridView(0.0, np.zeros((2, 3), np.int8), 0.05, (-1.5, 2.0))
+    T_map_grid = np.array([10.0, 20.0, np.pi / 2])
+    outputs.write_grid(tmp_path, grid, T_map_grid)
+    told = yaml.safe_load((tmp_path / "grid.yaml").read_text())
+    assert told["origin"] == pytest.approx([8.0, 18.5, np.pi / 2], abs=1e-6)
+    assert "turned by 90.0 degrees" in outputs.told_of_grid(tmp_path, grid, T_map_grid)
+
+
 def test_summary_is_plain_json_whatever_numbers_come(tmp_path):
     summary = {"a": np.int64(3), "b": np.float32(0.5), "c": float("nan"), "d": [True, None, Path("x")]}
     outputs.write_summary(tmp_path / "summary.json", summary)
