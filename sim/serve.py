@@ -145,7 +145,10 @@ def serve_world(
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
-    simulator = Simulator(worlds.load(world), seed, gui=gui)
+    built = worlds.load(world)
+    for remark in built.remarks:
+        sys.stderr.write(f"{remark}\n")
+    simulator = Simulator(built, seed, gui=gui)
     truth_log = truth_path.open("w", encoding="utf-8", buffering=1) if truth_path is not None else None
     server = PtyServer(simulator, truth_log)
     try:
