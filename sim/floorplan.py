@@ -4,23 +4,10 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.errors import BadStart, BadWorld
 from lemtomap.sim.faults import Faults
-from lemtomap.sim.raster import (
-    SPAWN_CLEARANCE_M,
-    clearance_m,
-    find_spawn,
-    rasterise,
-)
-from lemtomap.sim.world import (
-    Box,
-    Door,
-    GroundTruth,
-    Pose2,
-    Room,
-    Surface,
-    World,
-)
+from lemtomap.sim.raster import FAR_M, SPAWN_CLEARANCE_M, find_spawn, fits, rasterise
+from lemtomap.sim.world import Box, Door, GroundTruth, Pose2, Room, Surface, World
 
 if TYPE_CHECKING:
     from lemtomap.sim.movers import Mover
@@ -99,6 +86,7 @@ class FloorPlan:
         self.flat = True
         self.dock: Pose2 | None = None
         self.faults: Faults | None = None
+        self.remarks: tuple[str, ...] = ()
         self._walls: list[_Wall] = []
         self._boxes: list[Box] = []
         self._rooms: list[Room] = []
@@ -178,20 +166,19 @@ class FloorPlan:
         self._movers.append(mover)
 
     def build(self, spawn: Pose2 | None = None, description: str = "", name: str | None = None) -> World:
-        """Raise the walls. Raises BadWorld when the spawn pose stands in something."""
+        """Raise the walls. Raises BadStart when the spawn pose stands in something, and BadWorld."""
         boxes = tuple(box for wall in self._walls for box in wall.boxes()) + tuple(self._boxes)
         inside = spawn[:2] if spawn is not None else self._middle()
-        raster = rasterise(boxes, inside)
+        if not all(abs(metres) <= FAR_M for box in boxes for metres in (*box.centre, *box.half)):
+            raise BadWorld(f"{self.name}: something reaches more than {FAR_M / 1000:g} km")
+        try:
+            raster = rasterise(boxes, inside)
+        except BadWorld as error:
+            raise BadWorld(f"{self.name}: {error}") from error
         if spawn is None:
             spawn = find_spawn(raster, self.name)
-        else:
-            row, col = raster.cell(spawn[0], spawn[1])
-            rows, cols = raster.free.shape
-            known = 0 <= row < rows and 0 <= col < cols
-            if not known or clearance_m(raster)[row, col] < SPAWN_CLEARANCE_M / 2:
-                raise BadWorld(
-                    f"{self.name}: spawn ({spawn[0]:g}, {spawn[1]:g}) overlaps a wall or furniture"
-                )
+        elif not fits(raster, spawn[0], spawn[1], SPAWN_CLEARANCE_M / 2):
+            raise BadStart(f"{self.name}: spawn ({spawn[0]:g}, {spawn[1]:g}) overlaps a wall or furniture")
         truth = GroundTruth(tuple(self._rooms), tuple(self._doors))
         return World(
             name=name or self.name,
@@ -205,6 +192,7 @@ class FloorPlan:
             level_height_m=self.level_height_m,
             faults=self.faults,
             description=description,
+            remarks=self.remarks,
         )
 
     def _middle(self) -> Point:

@@ -20,6 +20,7 @@ from lemtomap.sim.hokuyo_stream import (
 
 FIRST_STEP, FRONT_STEP, LAST_STEP, SLITS = 44, 384, 725, 1024
 """Steps with data are FIRST..LAST, 682 of them; 0..768 may be asked for, 1024 make a full turn."""
+INITIAL_RPM = 600
 NOT_MEASURABLE = 19
 STRING_MAX = 16
 STRING_CHARS = frozenset(string.ascii_letters + string.digits + " ._+@")
@@ -76,7 +77,7 @@ class HokuyoFirmware:
     @property
     def rpm(self) -> int:
         """Motor speed; each CR step slows by one percent (the true steps are not established)."""
-        return 600 - 6 * self.motor_ratio
+        return INITIAL_RPM - INITIAL_RPM // 100 * self.motor_ratio
 
     def receive(self, data: bytes, now_s: float) -> bytes:
         """Take command bytes and return the replies."""
@@ -150,6 +151,11 @@ class HokuyoFirmware:
         self._stream = None
         self.laser_on = False
         self._latest = None
+        self.hung_up()
+
+    def hung_up(self) -> None:
+        """Forget scans asked for and not yet answered: closing a port drops DTR: nobody waits now."""
+        self._asked.clear()
 
     def _answer(self, line: str, now_s: float) -> bytes:
         command, _, text = line.partition(";")
@@ -187,7 +193,7 @@ class HokuyoFirmware:
             ("AMIN", str(FIRST_STEP)),
             ("AMAX", str(LAST_STEP)),
             ("AFRT", str(FRONT_STEP)),
-            ("SCAN", "600"),
+            ("SCAN", str(INITIAL_RPM)),
         ]
 
     def _state(self, now_s: float) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,6 +10,14 @@ from lemtomap.sim.errors import Unplugged
 from lemtomap.sim.faults import LinkFaults
 
 MAX_WAITING = 1 << 16  # bytes a host that never reads may let pile up, as a tty buffer would
+
+
+class Frame(NamedTuple):
+    """One piece as the device sent it."""
+
+    data: bytes
+    answer: bool
+    """To a command of the host's, who waits for it; else it comes by itself, and the next one soon."""
 
 
 class Link:
@@ -21,8 +30,8 @@ class Link:
         self._faults = faults
         self._rng = rng
         self._clock = clock
-        self._to_host: deque[tuple[float, bytes]] = deque()
-        self._to_device: list[bytes] = []
+        self._to_host: deque[tuple[float, Frame]] = deque()
+        self._to_device: list[bytes | None] = []
         self._waiting = 0
         self._last_arrival_s = 0.0
         self._pulled = False
@@ -41,7 +50,7 @@ class Link:
         """Whether the faults pull this cable at some time."""
         return bool(self._faults.unplugged)
 
-    def deliver(self, data: bytes, sent_s: float) -> None:
+    def deliver(self, data: bytes, sent_s: float, *, answer: bool = False) -> None:
         """Send from the device at a time; a whole piece is dropped when the host does not read."""
         if not data:
             return
@@ -55,7 +64,7 @@ class Link:
         if self._faults.burst_s:
             arrival = float(np.ceil(arrival / self._faults.burst_s)) * self._faults.burst_s
         self._last_arrival_s = max(arrival, self._last_arrival_s)  # bytes never overtake one another
-        self._to_host.append((self._last_arrival_s, damaged))
+        self._to_host.append((self._last_arrival_s, Frame(damaged, answer)))
         self._waiting += len(damaged)
 
     def _damage(self, data: bytes) -> bytes:
@@ -67,23 +76,26 @@ class Link:
         array[flipped] ^= (1 << self._rng.integers(0, 8, int(flipped.sum()))).astype(np.uint8)
         return array[self._rng.random(len(array)) >= faults.lose_byte].tobytes()
 
-    def collect(self) -> bytes:
-        """Return what the host has sent since the last call."""
-        if not self._to_device:
-            return b""
-        data = b"".join(self._to_device)
-        self._to_device.clear()
-        return data
+    def collect(self) -> list[bytes | None]:
+        """Return what the host has sent since the last call, in order; None where a host closed the port."""
+        sent, self._to_device = self._to_device, []
+        return sent
 
-    def read_frames(self) -> list[bytes]:
+    def read_frames(self) -> list[Frame]:
         """Host side: everything that has arrived, in the pieces the device sent."""
         self._check()
         now = self._clock() + 1e-9
-        frames: list[bytes] = []
+        frames: list[Frame] = []
         while self._to_host and self._to_host[0][0] <= now:
             frames.append(self._to_host.popleft()[1])
-            self._waiting -= len(frames[-1])
+            self._waiting -= len(frames[-1].data)
         return frames
+
+    def hang_up(self) -> None:
+        """Host side: close the port; what is under way to it is lost, as in a tty at its last close."""
+        self._to_host.clear()
+        self._waiting = 0
+        self._to_device.append(None)
 
     def write(self, data: bytes) -> None:
         """Host side: send to the device."""
@@ -131,11 +143,15 @@ class HostPort:
 
     def read(self) -> bytes:
         """Return everything that has arrived by now, perhaps nothing. Raises Unplugged."""
-        return b"".join(self._link.read_frames())
+        return b"".join(frame.data for frame in self._link.read_frames())
 
-    def read_frames(self) -> list[bytes]:
+    def read_frames(self) -> list[Frame]:
         """Return the same in the pieces the device sent (a replier that must not cut frames needs them)."""
         return self._link.read_frames()
+
+    def hang_up(self) -> None:
+        """Close the port, as its last client does: replies under way or owed reach nobody."""
+        self._link.hang_up()
 
     def write(self, data: bytes) -> None:
         """Send to the device. Raises Unplugged."""

@@ -1,5 +1,6 @@
 """Worlds as images: rasterise boxes, merge wall cells into few boxes, find room to stand."""
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -7,29 +8,39 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.shelter import ALL_ROUND, walls_around
 from lemtomap.sim.world import Box, Pose2, Raster
 
 SPAWN_CLEARANCE_M = 0.45  # body radius 0.178 m and room to turn and look around
+MAX_CELLS = 16_000_000  # 200 m x 200 m at 0.05 m
+MAX_BOXES = 60_000  # the physics has a body for each; a floor of 90 m mapped by robots has 24,000
+FAR_M = 20_000.0  # the physics counts in single precision: 2 mm out there
+STRIP_CELLS = 1 << 20
+MAX_DRAWN_CELLS = 200_000_000  # all boxes' surroundings together: seconds
 
 
 def merge_cells(occupied: NDArray[np.bool_]) -> list[tuple[int, int, int, int]]:
     """Cover occupied cells by few rectangles (row, col, rows, cols), longest run first come.
 
-    Holds: the rectangles are disjoint and cover exactly the occupied cells.
+    Holds: the rectangles are disjoint and cover exactly the occupied cells. Raises BadWorld when more than
+    MAX_BOXES are needed.
     """
     left = occupied.copy()
     rectangles: list[tuple[int, int, int, int]] = []
-    for row, col in np.argwhere(occupied):
-        if not left[row, col]:
-            continue
-        cols = _run(np.asarray(left[row, col:]))
-        rows = _run(np.asarray(left[row:, col]))
-        if cols >= rows:
-            rows = _run(np.asarray(left[row:, col : col + cols].all(axis=1)))
-        else:
-            cols = _run(np.asarray(left[row : row + rows, col:].all(axis=0)))
-        left[row : row + rows, col : col + cols] = False
-        rectangles.append((int(row), int(col), rows, cols))
+    for row in range(len(left)):
+        col = 0
+        while left[row, col:].any():
+            col += int(np.argmax(left[row, col:]))
+            cols = _run(np.asarray(left[row, col:]))
+            rows = _run(np.asarray(left[row:, col]))
+            if cols >= rows:
+                rows = _run(np.asarray(left[row:, col : col + cols].all(axis=1)))
+            else:
+                cols = _run(np.asarray(left[row : row + rows, col:].all(axis=0)))
+            left[row : row + rows, col : col + cols] = False
+            rectangles.append((row, col, rows, cols))
+            if len(rectangles) > MAX_BOXES:
+                raise BadWorld(f"walls fall into more than {MAX_BOXES} pieces: noise, or not a floor plan")
     return rectangles
 
 
@@ -56,13 +67,20 @@ def rasterise(boxes: Iterable[Box], inside: tuple[float, float], resolution_m: f
     """Draw all boxes that a robot could meet between floor and 0.4 m.
 
     `inside` is a point of the building's free space: free is what connects to it, never through walls.
+    Raises BadWorld when there are no boxes, too many, or they reach too far.
     """
     solid = [box for box in boxes if _meets_robot(box)]
     if not solid:
-        raise BadWorld("world: no walls at all")
+        raise BadWorld("no walls at all")
+    if len(solid) > MAX_BOXES:
+        raise BadWorld(f"{len(solid)} walls and other things, at most {MAX_BOXES}")
     corners = np.concatenate([_corners(box) for box in solid])
     low = np.floor(corners.min(axis=0) / resolution_m - 2) * resolution_m
     size = np.ceil((corners.max(axis=0) - low) / resolution_m).astype(int) + 2
+    require_cells(int(size[1]), int(size[0]), resolution_m)
+    spans = np.ptp(corners.reshape(len(solid), -1, 2), axis=1) / resolution_m + 3
+    if spans.prod(axis=1).sum() > MAX_DRAWN_CELLS:
+        raise BadWorld("too many long walls askew")
     occupied = np.zeros((size[1], size[0]), dtype=np.bool_)
     for box in solid:
         _draw(occupied, box, (float(low[0]), float(low[1])), resolution_m)
@@ -81,6 +99,14 @@ def _corners(box: Box) -> NDArray[np.float64]:
     return np.asarray(local @ np.array([[cos, sin], [-sin, cos]]) + box.centre[:2])
 
 
+def require_cells(rows: int, cols: int, resolution_m: float) -> None:
+    """Raise BadWorld when a raster would have more than MAX_CELLS."""
+    if rows * cols > MAX_CELLS:
+        size = f"{cols * resolution_m:.0f} x {rows * resolution_m:.0f} m"
+        most = f"at most {MAX_CELLS / 1e6:g} million cells"
+        raise BadWorld(f"{size} at {resolution_m:g} m a cell is too large, {most}")
+
+
 def _draw(occupied: NDArray[np.bool_], box: Box, origin: tuple[float, float], step: float) -> None:
     corners = _corners(box)
     rows, cols = occupied.shape
@@ -88,11 +114,14 @@ def _draw(occupied: NDArray[np.bool_], box: Box, origin: tuple[float, float], st
     col1, row1 = np.minimum(np.ceil((corners.max(axis=0) - origin) / step).astype(int) + 1, [cols, rows])
     xs = origin[0] + (np.arange(col0, col1) + 0.5) * step - box.centre[0]
     ys = origin[1] + (np.arange(row0, row1) + 0.5) * step - box.centre[1]
-    gx, gy = np.meshgrid(xs, ys)
     cos, sin = np.cos(box.yaw_rad), np.sin(box.yaw_rad)
     slack = step / 2 + 1e-6  # thin legs must not fall between cell centres
-    along, across = np.abs(cos * gx + sin * gy), np.abs(-sin * gx + cos * gy)
-    occupied[row0:row1, col0:col1] |= (along <= max(box.half[0], slack)) & (across <= max(box.half[1], slack))
+    strip = max(1, STRIP_CELLS // max(1, len(xs)))
+    for first in range(0, len(ys), strip):
+        gx, gy = np.meshgrid(xs, ys[first : first + strip])
+        along, across = np.abs(cos * gx + sin * gy), np.abs(-sin * gx + cos * gy)
+        inside = (along <= max(box.half[0], slack)) & (across <= max(box.half[1], slack))
+        occupied[row0 + first : row0 + first + len(inside), col0:col1] |= inside
 
 
 def connected(raster: Raster, inside: tuple[float, float]) -> NDArray[np.bool_]:
@@ -106,24 +135,60 @@ def connected(raster: Raster, inside: tuple[float, float]) -> NDArray[np.bool_]:
 
 def clearance_m(raster: Raster) -> NDArray[np.float64]:
     """Return float64 (rows, cols), metres from each free cell to the nearest cell that is not free."""
-    padded = np.pad(raster.free, 1)
-    distance = ndimage.distance_transform_edt(padded)
-    return np.asarray(distance, dtype=np.float64)[1:-1, 1:-1] * raster.resolution_m
+    return _clearance_m(raster.free, raster.resolution_m)
 
 
-def find_spawn(raster: Raster, name: str) -> Pose2:
-    """Choose a place to start: enough clearance, in the largest connected region, nearest to its middle.
+def _clearance_m(free: NDArray[np.bool_], resolution_m: float) -> NDArray[np.float64]:
+    distance = ndimage.distance_transform_edt(np.pad(free, 1))
+    return np.asarray(distance, dtype=np.float64)[1:-1, 1:-1] * resolution_m
 
-    Raises BadWorld when there is nowhere to stand.
+
+def fits(raster: Raster, x: float, y: float, needed_m: float) -> bool:
+    """Return whether a point lies on the raster and has so much clearance."""
+    row, col = raster.cell(x, y)
+    rows, cols = raster.free.shape
+    if not (0 <= row < rows and 0 <= col < cols):
+        return False
+    reach = math.ceil(needed_m / raster.resolution_m) + 1
+    low_row, low_col = max(0, row - reach), max(0, col - reach)
+    around = raster.free[low_row : row + reach + 1, low_col : col + reach + 1]
+    return bool(_clearance_m(around, raster.resolution_m)[row - low_row, col - low_col] >= needed_m)
+
+
+def roomy(raster: Raster, needed_m: float) -> NDArray[np.bool_]:
+    """Return which cells have so much clearance, bool (rows, cols); in strips, as distances need memory."""
+    rows, cols = raster.free.shape
+    reach = math.ceil(needed_m / raster.resolution_m) + 1
+    strip = max(reach, STRIP_CELLS // cols)
+    result = np.zeros_like(raster.free)
+    for row in range(0, rows, strip):
+        low = max(0, row - reach)
+        wide = _clearance_m(raster.free[low : row + strip + reach], raster.resolution_m) >= needed_m
+        result[row : row + strip] = wide[row - low : row - low + strip]
+    return result
+
+
+def find_spawn(raster: Raster, name: str, wall: NDArray[np.bool_] | None = None) -> Pose2:
+    """Choose a place to start: enough clearance, indoors, in the largest such region, nearest to its middle.
+
+    `wall`, bool (rows, cols), are the cells that make a place indoors; by default all that is occupied. Where
+    walls stand nowhere all round, the best there is counts. Raises BadWorld when there is nowhere to stand.
     """
-    roomy = clearance_m(raster) >= SPAWN_CLEARANCE_M
-    labels, count = ndimage.label(roomy)
+    wide = roomy(raster, SPAWN_CLEARANCE_M)
+    labels, count = ndimage.label(wide)
     if not count:
         raise BadWorld(f"{name}: no free space with {SPAWN_CLEARANCE_M} m of clearance to start in")
-    largest = int(np.argmax(np.bincount(labels.ravel())[1:])) + 1
-    cells = np.argwhere(labels == largest)
-    row, col = cells[np.argmin(((cells - cells.mean(axis=0)) ** 2).sum(axis=1))]
-    return (*raster.point(int(row), int(col)), _widest_view(raster, int(row), int(col)))
+    around = np.where(wide, walls_around(raster.occupied if wall is None else wall, raster.free), 0)
+    indoors = wide & (around >= min(ALL_ROUND, int(around.max())))
+    largest = int(np.argmax(np.bincount(labels[indoors], minlength=count + 1)[1:])) + 1
+    region = labels == largest
+    rows, cols = np.arange(region.shape[0])[:, None], np.arange(region.shape[1])
+    cells = np.count_nonzero(region)
+    mid_row = float((region.sum(axis=1) * rows[:, 0]).sum() / cells)
+    mid_col = float((region.sum(axis=0) * cols).sum() / cells)
+    away = np.where(region & indoors, (rows - mid_row) ** 2 + (cols - mid_col) ** 2, np.inf)
+    row, col = divmod(int(np.argmin(away)), len(cols))
+    return (*raster.point(row, col), _widest_view(raster, row, col))
 
 
 def _widest_view(raster: Raster, row: int, col: int) -> float:

@@ -1,141 +1,132 @@
-"""ROS map_server maps (YAML beside a PGM or PNG) as worlds: walls merged into few long boxes, extruded."""
+"""ROS map_server maps (YAML beside an image) as worlds: walls merged into few long boxes, extruded."""
 
-import math
-import warnings
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
 from scipy import ndimage
 
 from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.plan_image import Drawing, read_drawing
+from lemtomap.sim.plan_settings import read_settings
 from lemtomap.sim.raster import (
+    MAX_CELLS,
     SPAWN_CLEARANCE_M,
     boxes_from_raster,
-    clearance_m,
     connected,
     find_spawn,
+    fits,
+    require_cells,
 )
 from lemtomap.sim.ros_truth import read_truth
+from lemtomap.sim.turned import turned
 from lemtomap.sim.world import Pose2, Raster, World
 
 WALL_HEIGHT_M = 1.0
 SOLID_M2 = 0.25  # unmapped ground of that size is what nobody could look into; less is a speck of the mapping
 GAP_M = 2.5  # between copies and round them
-MAX_SIDE_PX = 20_000  # 1 km at 0.05 m
 KNOWN_SPAWNS: dict[str, Pose2] = {
     "willowgarage_perfect": (6.0, -16.0, 0.0)
 }  # as in 2014 (ros_lemtomap launch)
 
 
 def load_ros_map(path: Path) -> World:
-    """Read a map_server YAML. Raises BadWorld naming the file and the reason."""
-    settings = _read_yaml(path)
-    image_path = path.parent / str(settings["image"])
-    probability = _read_image(image_path, negate=bool(settings.get("negate", 0)))
+    """Read a map_server map. Raises BadWorld naming the file and the reason."""
+    settings = read_settings(path)
+    drawing = read_drawing(settings)
+    if not drawing.floor.any():
+        free = f"free_thresh {settings.free_thresh:g}"
+        raise BadWorld(f"{settings.image}: no free space (no pixel is free by {free})")
+    x0, y0, yaw = settings.origin
+    step = settings.resolution_m
     try:
-        resolution = float(settings["resolution"])
-        x0, y0, turn = (float(value) for value in (*settings["origin"], 0.0)[:3])
-        occupied_from = float(settings.get("occupied_thresh", 0.65))
-        free_below = float(settings.get("free_thresh", 0.196))
-    except (TypeError, ValueError, IndexError) as error:
-        raise BadWorld(f"{path}: resolution, origin or thresholds are not numbers ({error})") from error
-    if not 0.001 <= resolution <= 1.0:
-        raise BadWorld(f"{path}: resolution {resolution} m is outside 0.001 to 1 m")
-    if not all(map(math.isfinite, (x0, y0))) or turn != 0.0:
-        raise BadWorld(f"{path}: origin must be finite and not turned, is {settings['origin']}")
-    occupied = probability >= occupied_from
-    free = probability <= free_below
-    if not free.any():
-        raise BadWorld(f"{image_path}: no free space (no pixel lighter than free_thresh {free_below})")
-    occupied |= _edge_of_unmapped(occupied, free, resolution)
-    raster = Raster(occupied, free, resolution, (x0, y0))
-    spawn = _spawn(raster, path)
-    raster = Raster(occupied, connected(raster, spawn[:2]), resolution, (x0, y0))
-    return World(
-        name=path.stem,
-        boxes=boxes_from_raster(raster, WALL_HEIGHT_M),
-        raster=raster,
-        spawn=spawn,
-        truth=read_truth(path.parent, raster),
-        description=f"ROS map {path.name}",
-    )
+        ground, (row, col) = _ground(drawing, step)
+        raster = Raster(ground.occupied, ground.free, step, (x0 + col * step, y0 + row * step))
+        spawn = _spawn(raster, ground.wall, path)
+        raster = replace(raster, free=connected(raster, spawn[:2]))
+        world = World(
+            name=path.stem,
+            boxes=boxes_from_raster(raster, WALL_HEIGHT_M),
+            raster=raster,
+            spawn=spawn,
+            truth=read_truth(path.parent, (x0, y0 + len(drawing.floor) * step), step),
+            description=f"ROS map {path.name}",
+            remarks=drawing.remarks,
+        )
+        return turned(world, (x0, y0), yaw) if yaw else world
+    except BadWorld as error:
+        raise BadWorld(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
 
 
-def _edge_of_unmapped(
-    occupied: NDArray[np.bool_], free: NDArray[np.bool_], resolution_m: float
-) -> NDArray[np.bool_]:
-    """Return the unmapped cells that border on floor, bool (rows, cols): walls, as nothing is known behind.
+@dataclass(frozen=True, slots=True)
+class _Ground:
+    """Where a robot could drive, bool (rows, cols) each."""
 
-    Without them a robot leaves a real plan through glass and gaps, into a plain without end.
+    wall: NDArray[np.bool_]
+    """What the image draws as occupied."""
+    occupied: NDArray[np.bool_]
+    free: NDArray[np.bool_]
+
+    def part(self, rows: slice, cols: slice) -> "_Ground":
+        return _Ground(self.wall[rows, cols], self.occupied[rows, cols], self.free[rows, cols])
+
+
+def _ground(drawing: Drawing, resolution_m: float) -> tuple[_Ground, tuple[int, int]]:
+    """Decide on unmapped ground, and return row and column of the first cell in the image.
+
+    What lies outside the image is unmapped, too: where floor reaches its edge, a rim of cells more takes the
+    wall. Of an image too large to work on, what is mapped is cut out. Raises BadWorld when that is too large.
     """
-    unmapped = ~occupied & ~free
+    wall, floor, row, col = drawing.wall, drawing.floor, 0, 0
+    if wall.size > MAX_CELLS:
+        known = wall | floor
+        rows, cols = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+        row, col = int(rows[0]), int(cols[0])
+        wall, floor = (part[row : rows[-1] + 1, col : cols[-1] + 1] for part in (wall, floor))
+    require_cells(wall.shape[0], wall.shape[1], resolution_m)
+    ground = _close(np.pad(wall, 1), np.pad(floor, 1), resolution_m)
+    rim = ground.occupied.copy()
+    rim[1:-1, 1:-1] = False
+    if rim.any():
+        return ground, (row - 1, col - 1)
+    return ground.part(slice(1, -1), slice(1, -1)), (row, col)
+
+
+def _close(wall: NDArray[np.bool_], floor: NDArray[np.bool_], resolution_m: float) -> _Ground:
+    """Wall off large unmapped ground where it borders on floor, as nothing is known behind; a speck is floor.
+
+    Without that a robot leaves a real plan through glass and gaps, into a plain without end.
+    """
+    unmapped = ~wall & ~floor
     labels, _ = ndimage.label(unmapped)
     large = np.bincount(labels.ravel()) * resolution_m**2 >= SOLID_M2
+    large[labels[0, 0]] = True  # the rim goes on outside
     large[0] = False
-    return large[labels] & ndimage.binary_dilation(free)
+    solid = large[labels]
+    free = floor | (unmapped & ~solid)
+    return _Ground(wall, wall | (solid & ndimage.binary_dilation(free)), free)
 
 
-def _read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        settings = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise BadWorld(f"{path}: no such file") from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise BadWorld(f"{path}: not a readable YAML file ({' '.join(str(error).split())})") from error
-    if not isinstance(settings, dict):
-        raise BadWorld(f"{path}: a map_server YAML holds keys, this holds {type(settings).__name__}")
-    for key in ("image", "resolution", "origin"):
-        if key not in settings:
-            raise BadWorld(f"{path}: key '{key}' is missing")
-    return settings
-
-
-def _read_image(path: Path, *, negate: bool) -> NDArray[np.float64]:
-    """Return occupancy probability, float64 (rows, cols), row 0 at least y."""
-    try:
-        with warnings.catch_warnings(), _opened(path) as image:
-            if max(image.size) > MAX_SIDE_PX or min(image.size) < 3:
-                raise BadWorld(f"{path}: {image.size[0]} x {image.size[1]} pixels is no floor plan")
-            if image.mode not in {"L", "1", "LA", "I;16", "I"}:
-                raise BadWorld(f"{path}: image is not grey (mode {image.mode})")
-            grey = np.asarray(image.convert("L"), dtype=np.float64)
-    except FileNotFoundError as error:
-        raise BadWorld(f"{path}: no such image") from error
-    except Image.DecompressionBombError as error:
-        raise BadWorld(f"{path}: the image is too large") from error
-    except (UnidentifiedImageError, OSError, ValueError, SyntaxError) as error:
-        raise BadWorld(f"{path}: not a readable image ({error})") from error
-    value = grey[::-1] / 255.0
-    return value if negate else 1.0 - value
-
-
-def _opened(path: Path) -> Image.Image:
-    warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large halls are large images
-    return Image.open(path)
-
-
-def _spawn(raster: Raster, path: Path) -> Pose2:
+def _spawn(raster: Raster, wall: NDArray[np.bool_], path: Path) -> Pose2:
     known = KNOWN_SPAWNS.get(path.stem)
-    if known is not None:
-        row, col = raster.cell(known[0], known[1])
-        rows, cols = raster.free.shape
-        if 0 <= row < rows and 0 <= col < cols and clearance_m(raster)[row, col] >= SPAWN_CLEARANCE_M:
-            return known
-    return find_spawn(raster, str(path))
+    if known is not None and fits(raster, known[0], known[1], SPAWN_CLEARANCE_M):
+        return known
+    return find_spawn(raster, str(path), wall)
 
 
 def side_by_side(world: World, copies: int) -> World:
-    """Return so many copies of a map in a row, GAP_M apart, a wall round them all: they look all the same."""
+    """Return so many copies of a map in a row, GAP_M apart, a wall round them all: they look all the same.
+
+    Raises BadWorld when they become too large.
+    """
     raster = world.raster
     step = raster.resolution_m
     rows, cols = np.nonzero(raster.occupied)
     gap = round(GAP_M / step)
     building = np.pad(raster.occupied[rows.min() : rows.max() + 1, cols.min() : cols.max() + 1], gap)
     pitch = building.shape[1] - gap
+    require_cells(building.shape[0], pitch * copies + gap, step)
     occupied = np.zeros((building.shape[0], pitch * copies + gap), dtype=np.bool_)
     for index in range(copies):
         occupied[:, index * pitch : index * pitch + building.shape[1]] |= building
@@ -151,4 +142,5 @@ def side_by_side(world: World, copies: int) -> World:
         raster=joined,
         spawn=world.spawn,
         description=f"{copies} x {world.description}",
+        remarks=world.remarks,
     )

@@ -82,10 +82,10 @@ class PtyServer:
     def _listen(self, until_s: float) -> None:
         """Wait for the next step, taking commands as they come."""
         while (left_s := until_s - time.monotonic()) > 0:
-            ready, _, _ = select.select([pty for _, pty in self._pairs if pty.plugged], [], [], left_s)
+            select.select([fd for _, pty in self._pairs for fd in pty.awaited], [], [], left_s)
             for port, pty in self._pairs:
-                if pty in ready:
-                    _forward(port, pty.read())
+                if pty.plugged:
+                    _forward(port, pty.heard())
 
     def _send(self) -> None:
         for port, pty in self._pairs:
@@ -94,8 +94,9 @@ class PtyServer:
                 frames = port.read_frames()
             except Unplugged:
                 continue
+            pty.push()
             for frame in frames:
-                pty.write(frame)
+                pty.write(frame.data, answer=frame.answer)
 
     def _log_truth(self) -> None:
         if self._truth_log is None or self._simulator.now_s < self._logged_s + TRUTH_PERIOD_S:
@@ -113,11 +114,15 @@ class PtyServer:
             self._links.cleanup()
 
 
-def _forward(port: HostPort, data: bytes) -> None:
-    try:
-        port.write(data)
-    except Unplugged:
-        return  # bytes written to a pulled cable are lost
+def _forward(port: HostPort, heard: list[bytes | None]) -> None:
+    for piece in heard:
+        try:
+            if piece is None:
+                port.hang_up()
+            else:
+                port.write(piece)
+        except Unplugged:
+            return  # bytes written to a pulled cable are lost
 
 
 def _stop_without(parent: int, stop: threading.Event) -> None:
@@ -140,7 +145,10 @@ def serve_world(
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
-    simulator = Simulator(worlds.load(world), seed, gui=gui)
+    built = worlds.load(world)
+    for remark in built.remarks:
+        sys.stderr.write(f"{remark}\n")
+    simulator = Simulator(built, seed, gui=gui)
     truth_log = truth_path.open("w", encoding="utf-8", buffering=1) if truth_path is not None else None
     server = PtyServer(simulator, truth_log)
     try:

@@ -1,6 +1,7 @@
 """One robot in one world on a virtual clock: host ends of two cables, and the truth beside them."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -145,21 +146,38 @@ class Simulator:
         if self._gui:
             self._scene.show_robot(after.pose, after.height_m)
         self._path_m += math.hypot(after.x - before.x, after.y - before.y)
-        scan = self._urg.step(begin, end, before, after, laser_on=self.scanner.laser_on)
+        scan = self._urg.step(begin, end, before, after, laser_on=self.scanner.laser_on, rpm=self.scanner.rpm)
         if scan is not None:
             self.last_scan = Turn(self._urg.finished_s, scan)
-            self._hokuyo.deliver(self.scanner.scan_done(self._urg.finished_s, scan), end + SCAN_USB_S)
+            reply = self.scanner.scan_done(self._urg.finished_s, scan)
+            self._hokuyo.deliver(reply, end + SCAN_USB_S, answer=not self.scanner.streaming)
         self._ticks += 1
         self.now_s = end
 
     def _listen(self, now_s: float) -> None:
         """Hand what the host has written to the devices."""
-        data = self._kobuki.collect()
+        data = b"".join(piece for piece in self._kobuki.collect() if piece)
         if data:
             self.base.firmware.receive(data, now_s)
-        data = self._hokuyo.collect()
-        if data:
-            self._hokuyo.deliver(self.scanner.receive(data, now_s), now_s + USB_S)
+        for commands, closed in _by_client(self._hokuyo.collect()):
+            reply = self.scanner.receive(commands, now_s)
+            if closed:
+                self.scanner.hung_up()
+            else:
+                self._hokuyo.deliver(reply, now_s + USB_S, answer=True)
+
+
+def _by_client(pieces: list[bytes | None]) -> Iterator[tuple[bytes, bool]]:
+    """Return each client's commands together, and whether it has closed the port after them."""
+    commands = b""
+    for piece in pieces:
+        if piece is None:
+            yield commands, True
+            commands = b""
+        else:
+            commands += piece
+    if commands:
+        yield commands, False
 
 
 def _with_faults(config: SimConfig, faults: Faults) -> SimConfig:

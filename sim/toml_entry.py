@@ -1,13 +1,16 @@
 """One table of a world file: reads its values, and says file, line and reason when one cannot be used."""
 
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.errors import BadWorld, shown
 
+MAX_ITEMS = 4000  # in one list; a file of walls without end is no building
+MAX_TABLES = 1000  # of one kind
+MAX_NUMBER = 1e9  # metres, seconds or radians
+MAX_TEXT = 200  # characters
 LINK_KEYS = frozenset({"lose_byte", "flip_bit", "burst_s", "delay_s", "jitter_s", "unplugged"})
 KEYS: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     "": (frozenset({"name"}), frozenset({"map", "spawn", "dock", "description", "faults"})),
@@ -75,22 +78,42 @@ class TomlEntry:
         """Return value as so many finite numbers."""
         good = isinstance(value, list) and len(value) == count
         if not good or not all(_is_number(item) for item in value):  # type: ignore[attr-defined]
-            raise self.refuse(f"'{key}' must be {count} numbers, is {value!r}", key)
+            raise self.refuse(f"'{key}' must be {count} numbers, is {shown(value)}", key)
         return tuple(float(item) for item in value)  # type: ignore[attr-defined]
 
     def number_of(self, key: str, default: float, low: float, high: float) -> float:
         """Return one number within limits."""
         value = self.values.get(key, default)
         if not _is_number(value) or not low <= value <= high:
-            raise self.refuse(f"'{key}' must be a number from {low:g} to {high:g}, is {value!r}", key)
+            raise self.refuse(f"'{key}' must be a number from {low:g} to {high:g}, is {shown(value)}", key)
         return float(value)
 
     def choice(self, key: str, default: str, allowed: list[str]) -> str:
         """Return one of the allowed words."""
         value = self.values.get(key, default)
         if value not in allowed:
-            raise self.refuse(f"'{key}' must be one of {', '.join(allowed)}, is {value!r}", key)
+            raise self.refuse(f"'{key}' must be one of {', '.join(allowed)}, is {shown(value)}", key)
         return str(value)
+
+    def text_of(self, key: str, default: str | None = None) -> str:
+        """Return a name or a description."""
+        return self.checked_text(self.values.get(key, default), key)
+
+    def checked_text(self, value: object, key: str) -> str:
+        """Return value as one short line of plain characters."""
+        if not isinstance(value, str) or not value.isprintable() or not 0 < len(value) <= MAX_TEXT:
+            reason = f"'{key}' must be one line of at most {MAX_TEXT} characters, is {shown(value)}"
+            raise self.refuse(reason, key)
+        return value
+
+    def items(self, key: str, what: str) -> list[object]:
+        """Return a list, empty when there is none; `what` says in a refusal what belongs into it."""
+        value = self.values.get(key, [])
+        if not isinstance(value, list):
+            raise self.refuse(f"'{key}' must be a list of {what}", key)
+        if len(value) > MAX_ITEMS:
+            raise self.refuse(f"'{key}' has {len(value)} items, at most {MAX_ITEMS}", key)
+        return value
 
     def point(self, key: str) -> tuple[float, float]:
         """Return x, y."""
@@ -99,11 +122,11 @@ class TomlEntry:
 
     def points(self, key: str) -> list[tuple[float, float]]:
         """Return at least two points."""
-        value = self.values[key]
-        if not isinstance(value, list) or len(value) < 2:
+        value = self.items(key, "at least two points")
+        if len(value) < 2:
             raise self.refuse(f"'{key}' must be a list of at least two points", key)
         return [(x, y) for x, y in (self.checked(item, key, 2) for item in value)]
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= MAX_NUMBER

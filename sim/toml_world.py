@@ -42,18 +42,14 @@ from itertools import pairwise
 from pathlib import Path
 
 from lemtomap.sim import furniture
-from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.errors import BadStart, BadWorld
 from lemtomap.sim.faults import Faults, LinkFaults, Window
 from lemtomap.sim.floorplan import FloorPlan
 from lemtomap.sim.movers import Appearing, Person, SwingDoor
 from lemtomap.sim.ros_map import load_ros_map
-from lemtomap.sim.toml_entry import KEYS, TomlEntry
-from lemtomap.sim.world import (
-    Box,
-    Pose2,
-    Surface,
-    World,
-)
+from lemtomap.sim.text_file import read_text
+from lemtomap.sim.toml_entry import KEYS, MAX_ITEMS, MAX_TABLES, TomlEntry
+from lemtomap.sim.world import Box, Pose2, Surface, World
 
 Area = tuple[float, float, float, float]
 FLOOR_SLAB_M = 0.2
@@ -75,10 +71,13 @@ def load_toml(path: Path, *, day: int = 0) -> World:
     plan = FloorPlan(f"{path}")
     spawn = _pose(top, "spawn") if "spawn" in document else None
     if "map" in document:
-        base = load_ros_map(path.parent / str(document["map"]))
+        base = load_ros_map(path.parent / top.text_of("map"))
+        plan.remarks = base.remarks
         for box in base.boxes:
             plan.box(box)
         spawn = spawn or base.spawn
+    if sum(len(entry.items("points", "points")) for entry in entries["wall"]) > MAX_ITEMS:
+        raise top.refuse(f"all walls together have more than {MAX_ITEMS} points", "wall")
     for table, add in _ADD.items():
         for entry in entries[table]:
             add(plan, entry, day)
@@ -88,18 +87,16 @@ def load_toml(path: Path, *, day: int = 0) -> World:
     if "dock" in document:
         plan.dock = _pose(top, "dock")
     try:
-        return plan.build(spawn, str(document.get("description", path.name)), name=str(document["name"]))
-    except BadWorld as error:
+        return plan.build(spawn, top.text_of("description", path.name), name=top.text_of("name"))
+    except BadStart as error:
         raise BadWorld(f"{path}:{top.line('spawn')}: {str(error).removeprefix(f'{path}: ')}") from error
 
 
 def _read(path: Path) -> TomlEntry:
+    text = read_text(path)
     try:
-        text = path.read_text(encoding="utf-8")
         document = tomllib.loads(text)
-    except FileNotFoundError as error:
-        raise BadWorld(f"{path}: no such file") from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: also a number of ten thousand digits
         raise BadWorld(f"{path}: not a readable TOML file ({error})") from error
     top = TomlEntry(path, text, "", 0, document)
     top.check_keys()
@@ -115,6 +112,8 @@ def _entries(top: TomlEntry, table: str) -> list[TomlEntry]:
     tables = top.values.get(table, [])
     if not isinstance(tables, list) or not all(isinstance(item, dict) for item in tables):
         raise top.refuse(f"write [[{table}]], one table each", table)
+    if len(tables) > MAX_TABLES:
+        raise top.refuse(f"{len(tables)} times [[{table}]], at most {MAX_TABLES}", table)
     entries = [TomlEntry(top.path, top.text, table, index, item) for index, item in enumerate(tables)]
     for entry in entries:
         entry.check_keys()
@@ -139,17 +138,18 @@ def _room(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
     low, high = entry.point("low"), entry.point("high")
     if not (low[0] < high[0] and low[1] < high[1]):
         raise entry.refuse("'low' must lie left of and below 'high'", "low")
-    plan.room(str(entry.values["name"]), low, high, kind=str(entry.values.get("kind", "room")))
+    plan.room(entry.text_of("name"), low, high, kind=entry.text_of("kind", "room"))
 
 
 def _door(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
     rooms = entry.values["rooms"]
     if not isinstance(rooms, list) or len(rooms) != 2:
         raise entry.refuse("'rooms' must be the names of two rooms", "rooms")
-    name = str(entry.values.get("name", f"door {entry.number + 1}"))
+    a, b = (entry.checked_text(room, "rooms") for room in rooms)
+    name = entry.text_of("name", f"door {entry.number + 1}")
     width = entry.number_of("width", 0.95, 0.4, 10.0)
     try:
-        door = plan.door(name, entry.point("at"), (str(rooms[0]), str(rooms[1])), width_m=width)
+        door = plan.door(name, entry.point("at"), (a, b), width_m=width)
     except BadWorld as error:
         raise entry.refuse(f"door '{name}' at {entry.values['at']} lies in no wall", "at") from error
     leaf = entry.choice("leaf", "none", ["none", "swings", "closed"])
@@ -165,10 +165,7 @@ def _door(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
 def _furniture(plan: FloorPlan, entry: TomlEntry, day: int) -> None:
     kind = entry.choice("kind", "", list(FURNITURE))
     x, y, yaw = entry.numbers("at", 3)
-    moved = entry.values.get("moved", [])
-    if not isinstance(moved, list):
-        raise entry.refuse("'moved' must be a list of [day, x, y, yaw]", "moved")
-    for item in moved:
+    for item in entry.items("moved", "[day, x, y, yaw]"):
         from_day, *place = entry.checked(item, "moved", 4)
         if from_day <= day:
             x, y, yaw = place
@@ -213,6 +210,8 @@ def _floors(plan: FloorPlan, ramps: list[TomlEntry], holes: list[TomlEntry]) -> 
     for entry in holes:
         low, high = entry.point("low"), entry.point("high")
         areas = [piece for area in areas for piece in _without(area, (*low, *high))]
+        if len(areas) > MAX_ITEMS:
+            raise entry.refuse(f"the holes cut the floor into more than {MAX_ITEMS} pieces", "low")
     for x0, y0, x1, y1 in areas:
         centre = ((x0 + x1) / 2, (y0 + y1) / 2, -FLOOR_SLAB_M / 2)
         half = ((x1 - x0) / 2, (y1 - y0) / 2, FLOOR_SLAB_M / 2)
@@ -268,9 +267,7 @@ def _table(top: TomlEntry, name: str, values: object) -> TomlEntry:
 
 
 def _link(entry: TomlEntry) -> LinkFaults:
-    windows = entry.values.get("unplugged", [])
-    if not isinstance(windows, list):
-        raise entry.refuse("'unplugged' must be a list of [from, to] in seconds", "unplugged")
+    windows = entry.items("unplugged", "[from, to] in seconds")
     return LinkFaults(
         lose_byte=entry.number_of("lose_byte", 0.0, 0.0, 1.0),
         flip_bit=entry.number_of("flip_bit", 0.0, 0.0, 1.0),

@@ -8,21 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.sim.body import BodyState
-from lemtomap.sim.hokuyo import (
-    FIRST_STEP,
-    FRONT_STEP,
-    LAST_STEP,
-    NOT_MEASURABLE,
-    SLITS,
-)
+from lemtomap.sim.hokuyo import FIRST_STEP, FRONT_STEP, INITIAL_RPM, LAST_STEP, NOT_MEASURABLE, SLITS
 from lemtomap.sim.hokuyo_stream import STEPS
-from lemtomap.sim.optics import (
-    NOTHING,
-    WEAK,
-    BeamHits,
-    OpticsConfig,
-    measure,
-)
+from lemtomap.sim.optics import NOTHING, WEAK, BeamHits, OpticsConfig, measure
 from lemtomap.sim.scene import Scene
 from lemtomap.sim.world import Pose2
 
@@ -54,7 +42,8 @@ class Urg:
         self._scene = scene
         self._config = config
         self._rng = rng
-        self.period_s = 0.1 * (1.0 + config.motor_sigma * float(rng.standard_normal()))
+        self._motor_error = config.motor_sigma * float(rng.standard_normal())
+        self._rpm = INITIAL_RPM
         self._phase_s = float(rng.uniform(0.0, self.period_s))
         self._turn = 0
         self._next = 0
@@ -68,6 +57,11 @@ class Urg:
         self._points = np.zeros((BEAMS, 2))
 
     @property
+    def period_s(self) -> float:
+        """How long a turn takes at the present speed."""
+        return 60.0 / self._rpm * (1.0 + self._motor_error)
+
+    @property
     def started_s(self) -> float:
         """When step 0 of the present turn was passed."""
         return self._phase_s + self._turn * self.period_s
@@ -77,10 +71,11 @@ class Urg:
         return self.period_s / SLITS
 
     def step(
-        self, begin_s: float, end_s: float, before: BodyState, after: BodyState, *, laser_on: bool
+        self, begin_s: float, end_s: float, before: BodyState, after: BodyState, *, laser_on: bool, rpm: int
     ) -> NDArray[np.int64] | None:
         """Turn the mirror from begin_s to end_s; return a finished scan, int64 (769,) in mm or error codes.
 
+        A new speed of the motor counts from the next turn on.
         `finished_s` then tells when the turn of the returned scan had passed step 0.
         """
         if not self._track:
@@ -100,6 +95,8 @@ class Urg:
         scan = self._measure() if self._shining else None
         self.finished_s = self.started_s
         self._turn += 1
+        if rpm != self._rpm:
+            self._phase_s, self._turn, self._rpm = self.started_s, 0, rpm
         self._next, self._begun = 0, False
         return scan
 

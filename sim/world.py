@@ -150,6 +150,8 @@ class World:
     faults: Faults | None = None
     """What goes wrong in a run in this world unless the run says otherwise."""
     description: str = ""
+    remarks: tuple[str, ...] = ()
+    """What the user should know about how the files were read, one line each."""
 
     def level_at(self, height_m: float) -> int:
         """Return the storey of a robot at a height."""

@@ -56,7 +56,8 @@ class SimOptions:
 
 def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
     """Run until the mission is over or the time is up; return the summary. Raises BadWorld, BadSetting."""
-    worlds.load(options.world)
+    for remark in worlds.load(options.world).remarks:
+        bar.say(remark)
     if options.map_path is not None and options.map_path.exists():
         TopoStore.view(options.map_path).close()
     parse_mission(options.mission)

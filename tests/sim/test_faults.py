@@ -120,6 +120,60 @@ def test_dock_is_seen_on_the_right_side_and_charges_on_contact(tmp_path):
     assert docked.dock_ir[1] == 0x02
 
 
+def test_a_slower_motor_turns_slower_and_its_stamps_and_beams_with_it(tmp_path):
+    simulator = Simulator(world_of(tmp_path), 1)
+    turns_s: list[float] = []
+
+    def turn_for(seconds: float) -> list[float]:
+        turns_s.clear()
+        end_s = simulator.now_s + seconds
+        while simulator.now_s < end_s:
+            simulator.advance(simulator.now_s + 0.01)
+            started_s = simulator.last_scan.started_s if simulator.last_scan else 0.0
+            if not turns_s or turns_s[-1] != started_s:
+                turns_s.append(started_s)
+        return list(np.diff(turns_s[2:]))
+
+    simulator.hokuyo.write(b"MD0044072501000\n")
+    assert np.allclose(turn_for(1.0), 60.0 / 600, rtol=0.01)
+    simulator.hokuyo.write(b"CR10\n")
+    assert np.allclose(turn_for(1.5), 60.0 / 540, rtol=0.01)
+    assert b"540[rpm]" in _ask(simulator, b"II\n")
+    simulator.hokuyo.write(b"RS\nBM\n")
+    assert np.allclose(turn_for(1.0), 60.0 / 600, rtol=0.01)
+    simulator.close()
+
+
+def _ask(simulator: Simulator, command: bytes) -> bytes:
+    simulator.hokuyo.write(command)
+    simulator.advance(simulator.now_s + 0.05)
+    return simulator.hokuyo.read()
+
+
+def test_a_scan_asked_for_by_one_client_is_not_sent_to_the_next(tmp_path):
+    simulator = Simulator(world_of(tmp_path), 1)
+    simulator.hokuyo.write(b"BM\nGD0044072501\n")
+    simulator.hokuyo.hang_up()
+    simulator.hokuyo.write(b"VV\n")
+    simulator.advance(1.0)
+    said = simulator.hokuyo.read()
+    assert said.startswith(b"VV\n00P\n")
+    assert b"GD" not in said
+    simulator.close()
+
+
+def test_only_what_was_asked_for_waits_for_a_slow_reader(tmp_path):
+    simulator = Simulator(world_of(tmp_path), 1)
+    simulator.hokuyo.write(b"BM\nGD0044072501\n")
+    simulator.advance(0.5)
+    assert [frame.answer for frame in simulator.hokuyo.read_frames()] == [True, True]
+    simulator.hokuyo.write(b"MD0044072501000\n")
+    simulator.advance(0.8)
+    assert [frame.answer for frame in simulator.hokuyo.read_frames()][:3] == [True, False, False]
+    assert not any(frame.answer for frame in simulator.kobuki.read_frames())
+    simulator.close()
+
+
 def hung_up(client: int) -> bool:
     """Read until the port says that it has gone."""
     try:

@@ -68,6 +68,18 @@ def test_two_character_scan_waits_for_the_first_turn():
     assert device.scan_done(0.0, ranges()) == b"GS0383038501\n00P\n0@83K\n?X?YnP]\n\n"
 
 
+@pytest.mark.parametrize("ending", [b"QT\n", b"RS\n", b"TM0\n", None])
+def test_scans_asked_for_are_not_answered_after_an_end_or_a_reset_or_to_the_next_client(ending):
+    device = scanner()
+    device.receive(b"BM\nGD0383038501\nGS0383038501\n", 0.0)
+    if ending is None:
+        device.hung_up()
+    else:
+        assert device.receive(ending, 0.0) == ending + b"00P\n\n"
+        device.receive(b"TM2\nBM\n", 0.0)
+    assert device.scan_done(0.1, ranges()) == b""
+
+
 def test_stream_skips_scans_and_ignores_one_begun_before_the_command():
     device = scanner()
     device.receive(b"MD0383038501200\n", 5.0)

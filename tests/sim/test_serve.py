@@ -72,6 +72,83 @@ def test_unread_port_drops_whole_frames_and_keeps_little_backlog():
     port.close()
 
 
+def opened(port: PtyPort) -> int:
+    return os.open(port.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+
+
+def read_all(port: PtyPort, client: int) -> bytes:
+    """Read as a client does, while the device pushes on what it owes."""
+    data = b""
+    while select.select([client], [], [], 0.05)[0]:
+        data += os.read(client, 65536)
+        port.push()
+    return data
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_bytes_left_unread_by_one_client_do_not_reach_the_next(at_once):
+    port = PtyPort()
+    client = opened(port)
+    port.write(b"owed to the first, " * 400, answer=True)
+    select.select([client], [], [], 1.0)
+    os.close(client)
+    if at_once:  # before the device has seen that anybody went
+        client = opened(port)
+        assert port.heard() == [None, b""]
+    else:
+        assert port.heard() == [b"", None]
+        port.write(b"to nobody")
+        client = opened(port)
+    port.write(b"to the second")
+    assert read_all(port, client) == b"to the second"
+    os.close(client)
+    port.close()
+
+
+def test_a_second_opening_beside_a_client_takes_nothing_from_it():
+    port = PtyPort()
+    client = opened(port)
+    port.write(b"scan")
+    os.close(opened(port))  # stty, fuser
+    assert port.heard() == []
+    assert read_all(port, client) == b"scan"
+    os.close(client)
+    port.close()
+
+
+def test_commands_of_a_client_that_closed_at_once_are_heard_before_its_going():
+    port = PtyPort()
+    client = opened(port)
+    os.write(client, b"BM\n")
+    os.close(client)
+    assert port.heard() == [b"BM\n", None]
+    assert port.heard() == []
+    port.close()
+
+
+def test_answers_larger_than_the_room_of_the_port_come_whole_without_another_command():
+    port = PtyPort()
+    client = opened(port)
+    answers = [bytes([65 + k]) * 2134 for k in range(20)]
+    for answer in answers:
+        port.write(answer, answer=True)
+    assert read_all(port, client) == b"".join(answers)
+    assert port.dropped_frames == 0
+    os.close(client)
+    port.close()
+
+
+def test_a_client_that_never_reads_is_owed_a_bounded_number_of_answers():
+    port = PtyPort()
+    client = opened(port)
+    for _ in range(100):
+        port.write(bytes(4096), answer=True)
+    assert port.dropped_frames >= 80
+    assert len(read_all(port, client)) % 4096 == 0
+    os.close(client)
+    port.close()
+
+
 def test_unknown_world_is_one_line_and_exit_code_2():
     done = subprocess.run(
         [sys.executable, "-m", "lemtomap.sim.serve", "--world", "atlantis"],

@@ -53,8 +53,8 @@ class Stopwatch(PtyServer):
         pty = self._pairs[0][1]
         send = pty.write
 
-        def sent(frame: bytes) -> None:
-            send(frame)
+        def sent(frame: bytes, *, answer: bool = False) -> None:
+            send(frame, answer=answer)
             if self._awaited and BUMPED.match(frame):
                 self._awaited, self._bumped_s = False, time.monotonic()
 
