@@ -152,7 +152,7 @@ def test_ros_map_becomes_few_boxes_and_bad_ones_one_line(tmp_path):
     with pytest.raises(BadWorld, match=r"m\.pgm: not an image"):
         worlds.load(settings)
     settings.write_text(text.replace("0.05", "x"))
-    with pytest.raises(BadWorld, match=r"m\.pgm: not an image|not numbers"):
+    with pytest.raises(BadWorld, match=r"m\.pgm: not an image|must be a number"):
         worlds.load(settings)
 
 
