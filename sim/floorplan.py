@@ -2,15 +2,11 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from lemtomap.sim.errors import BadStart, BadWorld
 from lemtomap.sim.faults import Faults
 from lemtomap.sim.raster import FAR_M, SPAWN_CLEARANCE_M, find_spawn, fits, rasterise
-from lemtomap.sim.world import Box, Door, GroundTruth, Pose2, Room, Surface, World
-
-if TYPE_CHECKING:
-    from lemtomap.sim.movers import Mover
+from lemtomap.sim.world import Box, Door, GroundTruth, Mover, Pose2, Room, Surface, World
 
 WALL_THICKNESS_M = 0.12
 WALL_HEIGHT_M = 2.4
@@ -161,7 +157,7 @@ class FloorPlan:
         """Put a box anywhere."""
         self._boxes.append(box)
 
-    def mover(self, mover: "Mover") -> None:
+    def mover(self, mover: Mover) -> None:
         """Add something that moves."""
         self._movers.append(mover)
 

@@ -2,35 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from lemtomap.sim.world import Box, Pose2, Surface
+from lemtomap.sim.world import Box, Motion, Pose2, Surface
 
 NOWHERE: Pose2 = (1e4, 1e4, 0.0)
 """Where a thing is that is not there."""
-
-
-class Motion(Protocol):
-    """One moving thing in one run; may hold state."""
-
-    def step(self, now_s: float, dt_s: float, robot: Pose2) -> Pose2:
-        """Return where the thing is at now_s."""
-        ...
-
-
-class Mover(Protocol):
-    """A thing that moves, as the world describes it."""
-
-    @property
-    def parts(self) -> tuple[Box, ...]:
-        """Boxes in the thing's own frame."""
-        ...
-
-    def begin(self, seed: int) -> Motion:
-        """Start one run."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

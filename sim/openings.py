@@ -8,7 +8,7 @@ IN_CLOSE, IN_OPEN = 0x08 | 0x10, 0x20
 HEADER = struct.Struct("iIII")  # watch, mask, cookie, length of a name that a watched file never has
 
 
-class Openings:
+class FileOpenings:
     """Watches one file."""
 
     def __init__(self, path: str) -> None:

@@ -12,7 +12,7 @@ import termios
 import tty
 from pathlib import Path
 
-from lemtomap.sim.openings import Openings
+from lemtomap.sim.openings import FileOpenings
 
 FULL_BYTES = 3500  # the kernel's line discipline holds 4095; beyond this nobody is reading in time
 OWED_BYTES = 1 << 16  # answers kept for a client that asks faster than it reads
@@ -29,7 +29,7 @@ class PtyPort:
         self._tty = self.path = ""
         self._clients = 0
         self._attended = False
-        self._openings: Openings | None = None
+        self._openings: FileOpenings | None = None
         self.dropped_frames = 0
         """Frames nobody read in time."""
         self.plug(into=True)
@@ -41,7 +41,7 @@ class PtyPort:
             tty.setraw(self._slave)
             os.set_blocking(self._master, False)
             self._tty = self.path = os.ttyname(self._slave)
-            self._openings = Openings(self._tty)
+            self._openings = FileOpenings(self._tty)
             self._attended = self._openings.fileno() < 0  # a kernel that cannot tell: somebody may be there
             if not self._attended:
                 self._let_go()

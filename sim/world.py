@@ -6,15 +6,12 @@ Frame `world`: metres, x east, y north, z up, floor at z = 0. Plain data, no eng
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.sim.faults import Faults
-
-if TYPE_CHECKING:
-    from lemtomap.sim.movers import Mover
 
 Pose2 = tuple[float, float, float]
 """x m, y m, yaw rad."""
@@ -131,6 +128,27 @@ class Raster:
         return x0 + (col + 0.5) * self.resolution_m, y0 + (row + 0.5) * self.resolution_m
 
 
+class Motion(Protocol):
+    """One moving thing in one run; may hold state."""
+
+    def step(self, now_s: float, dt_s: float, robot: Pose2) -> Pose2:
+        """Return where the thing is at now_s."""
+        ...
+
+
+class Mover(Protocol):
+    """A thing that moves, as the world describes it."""
+
+    @property
+    def parts(self) -> tuple[Box, ...]:
+        """Boxes in the thing's own frame."""
+        ...
+
+    def begin(self, seed: int) -> Motion:
+        """Start one run."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class World:
     """A building a robot can be put into."""
@@ -140,7 +158,7 @@ class World:
     raster: Raster
     spawn: Pose2
     truth: GroundTruth = field(default_factory=GroundTruth)
-    movers: "tuple[Mover, ...]" = ()
+    movers: tuple[Mover, ...] = ()
     dock: Pose2 | None = None
     """Where a charging dock stands and which way it faces."""
     flat: bool = True

@@ -75,7 +75,7 @@ CHANNELS = dict(enumerate((*RAW_TOPICS, *AGAIN_TOPICS), start=1))
 """These get their numbers first, so that they are known even when the chunk that tells them is lost."""
 
 
-class Opening:
+class LaserConversation:
     """The laser's conversation from the opening of its port until it streams."""
 
     def __init__(self) -> None:
@@ -110,7 +110,7 @@ class Recorder:
         """`about` is told in each part: see lemtomap.robot.devices.recorded.Recording.about."""
         self.parts = PartFiles(path, limit_bytes)
         self._about = dict(about or {})
-        self._opening = Opening()
+        self._opening = LaserConversation()
         self._closed = False
         self._stamp_ns = 0
         self._begin_part()

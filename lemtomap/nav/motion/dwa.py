@@ -22,7 +22,7 @@ NEAR_M = 1.3
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
+class ArcEnd:
     """The plan's target is where to stop."""
 
     to_go_m: float
@@ -44,7 +44,7 @@ def choose_twist(
     plan: MetricPlan,
     T_grid_base: Pose,
     twist: Twist,
-    ending: Ending | None,
+    ending: ArcEnd | None,
     body: BodyLimits,
     dwa: DwaConfig,
 ) -> Choice:
@@ -65,7 +65,7 @@ def _choose(
     plan: MetricPlan,
     T_grid_base: Pose,
     twist: Twist,
-    ending: Ending | None,
+    ending: ArcEnd | None,
     body: BodyLimits,
     dwa: DwaConfig,
     keep_m: float,

@@ -8,7 +8,7 @@ import numpy as np
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.motion.dwa import (
     HELD_MPS,
-    Ending,
+    ArcEnd,
     approach,
     choose_twist,
 )
@@ -65,7 +65,7 @@ class Follower:
         heading_off = way_heading_off(plan, T_grid_base)
         if self._must_turn(heading_off, twist):
             return Step(turn_in_place(heading_off, twist, config), FollowerState.TURN)
-        ending = None if end_m is None else Ending(end_m)
+        ending = None if end_m is None else ArcEnd(end_m)
         choice = choose_twist(plan, T_grid_base, twist, ending, body, config.dwa)
         held = choice.twist is None or choice.twist.v_mps < HELD_MPS
         if held and abs(heading_off) > HELD_TURN_RAD and twist.v_mps < HELD_MPS:

@@ -38,7 +38,7 @@ class JournalEntry:
     what: str
 
 
-class Recording:
+class RowsBefore:
     """Collects the rows an edit is about to touch. Call `touch` before each write."""
 
     def __init__(self, store: TopoStore) -> None:
@@ -62,9 +62,9 @@ class Recording:
 
 
 @contextmanager
-def recorded(store: TopoStore, what: str, stamp_s: float = 0.0) -> Iterator[Recording]:
+def recorded(store: TopoStore, what: str, stamp_s: float = 0.0) -> Iterator[RowsBefore]:
     """Make everything written inside one edit that `undo` takes back; when the body raises, none of it."""
-    recording = Recording(store)
+    recording = RowsBefore(store)
     with store.whole():
         yield recording
         sql = "INSERT INTO journal(stamp, what, before) VALUES(?, ?, ?)"
