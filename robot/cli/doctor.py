@@ -13,6 +13,7 @@ def register(app: typer.Typer) -> None:
         app,
         doctor,
         "lemtomap doctor                                     find both devices and listen to them",
+        "sudo lemtomap doctor --install-udev                 stable names and prompt bytes for both cables",
         "lemtomap doctor --kobuki /dev/ttyUSB0 --seconds 20  a longer look, for the gyro's drift",
     )
 
@@ -25,9 +26,17 @@ def doctor(
     hokuyo: Annotated[
         str | None, typer.Option(metavar="PORT", help="the laser's port; default: found by its USB identity")
     ] = None,
+    install_udev: Annotated[
+        bool, typer.Option("--install-udev", help="write the udev rules for both cables; needs root")
+    ] = False,
     seconds: Annotated[float, typer.Option(metavar="S", min=2.0, help="how long to listen to each")] = 6.0,
 ) -> int:
     """Check machine, ports and devices, and name every fault with its cure: moves nothing."""
+    if install_udev:
+        from lemtomap.robot.doctor import udev_rules
+
+        typer.echo(f"{udev_rules.install_udev()}: written; plug both cables in again")
+        return 0
     from lemtomap.robot.doctor.examine import examine, report
 
     return report(examine(kobuki, hokuyo, seconds))

@@ -16,6 +16,7 @@ from lemtomap.drivers.kobuki import events as kobuki
 from lemtomap.drivers.kobuki.battery import ChargeLevel as BatteryLevel
 from lemtomap.drivers.kobuki.battery import PowerSource
 from lemtomap.drivers.kobuki.packets import BadFrame
+from lemtomap.robot.doctor.udev_rules import INSTALL
 
 BASE, LASER = "Kobuki base", "Hokuyo laser"
 
@@ -58,7 +59,7 @@ def judge_error(subject: str, error: DriverError) -> Finding:
         doubt = "are the two ports swapped?" if swapped else "is it the right port?"
         cure = f"{doubt} Leave --kobuki and --hokuyo away to let them be found"
     elif isinstance(error, PortDenied):
-        cure = "or install the udev rules: tools/udev/60-lemtomap.rules"
+        cure = f"or install the udev rules: {INSTALL}"
     return Finding(Verdict.FAULT, subject, str(error), cure)
 
 
@@ -77,7 +78,7 @@ def judge_base(told: Sequence[object]) -> Iterator[Finding]:
     delays = np.array([sample.arrival_s - sample.stamp_s for sample in samples[len(samples) // 4 :]])
     spread_s = float(np.percentile(delays, 99) - delays.min()) if len(delays) else 0.0
     if spread_s > LATE_S:
-        cure = "set the latency timer to 1 ms (tools/udev/60-lemtomap.rules), close busy programs"
+        cure = f"set the latency timer to 1 ms ({INSTALL}), close busy programs"
         yield Finding(Verdict.WARNING, BASE, f"packets come up to {1e3 * spread_s:.0f} ms late", cure)
     yield from _gyro(samples)
     yield from _power(samples[-1])

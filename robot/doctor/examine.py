@@ -30,6 +30,7 @@ from lemtomap.robot.doctor.diagnosis import (
     judge_error,
     judge_laser,
 )
+from lemtomap.robot.doctor.udev_rules import INSTALL
 from lemtomap.robot.output.files import versions
 from lemtomap.sim.errors import NoPhysics
 
@@ -78,10 +79,10 @@ def check_port(
     with contextlib.suppress(OSError, ValueError):
         milliseconds = int(timer.read_text())
         if milliseconds > SLOW_TIMER_MS:
-            cure = f"sudo cp tools/udev/60-lemtomap.rules /etc/udev/rules.d/, or: echo 1 | sudo tee {timer}"
+            cure = f"{INSTALL}, or: echo 1 | sudo tee {timer}"
             yield Finding(Verdict.WARNING, subject, f"latency timer is {milliseconds} ms, not 1", cure)
     if name.startswith("tty") and not Path(identity.link).exists():
-        cure = "optional: tools/udev/60-lemtomap.rules makes it"
+        cure = f"optional: {INSTALL} makes it"
         yield Finding(Verdict.GOOD, subject, f"no stable name {identity.link}", cure)
 
 
