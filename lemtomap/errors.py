@@ -4,6 +4,7 @@ LemtomapError
 ├── BadInput      a file or a setting is unusable: tell the user its name, the place and the reason
 │   ├── BadLog       a recorded log
 │   ├── BadMap       a map file: foreign, truncated, of a newer schema
+│   ├── BadSample    a scan or an odometry that is none: its numbers are of another kind or shape
 │   └── BadSetting   a configuration that cannot work
 └── NoRoute       the goal cannot be reached: report, take the next goal
 """
@@ -23,6 +24,10 @@ class BadLog(BadInput):
 
 class BadMap(BadInput):
     """A map file cannot be used; the text names the file and the reason."""
+
+
+class BadSample(BadInput):
+    """A scan or an odometry cannot be used; the text names the argument, and its shape or value."""
 
 
 class BadSetting(BadInput):

@@ -5,13 +5,21 @@ scan, odometry -> window SLAM -> was the robot moved? -> topological SLAM -> rec
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.displacement import Watch
-from lemtomap.grid import GridSlam
+from lemtomap.errors import BadSample
+from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam, SlamConfig
+from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import LevelChanged, NavEvent
+from lemtomap.topo.file.store import TopoStore
+from lemtomap.topo.loops import LoopRecogniser
+from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.types import (
     GridView,
@@ -55,6 +63,33 @@ class Mapper:
         self._disowned: MapView | None = None
         """The last view, worth nothing any more, until there is another."""
 
+    @classmethod
+    def open(
+        cls,
+        path: Path | str,
+        *,
+        slam: SlamConfig | None = None,
+        topo: TopoConfig | None = None,
+        loops: LoopConfig | None = None,
+        seed: int = 0,
+    ) -> Self:
+        """Map into a file with the default window SLAM: a new one, or a map to go on with.
+
+        In a map to go on with the robot may stand anywhere; it is `lost` until it recognises a place. Raises
+        BadMap, BadSetting.
+        """
+        known = Path(path).exists()
+        store = (TopoStore.open if known else TopoStore.create)(path)
+        make_slam = partial(SLAMS[DEFAULT_SLAM], slam or SlamConfig(), seed)
+        return cls(make_slam, TopoMapper(topo or TopoConfig(), store, recogniser=LoopRecogniser(loops)))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        """Write everything, also what an exception leaves half way."""
+        self.close()
+
     def update(
         self,
         scan: Scan,
@@ -69,7 +104,10 @@ class Mapper:
         hits_base: the scan's hits, float (N, 2), metres, base frame at its stamp, from whoever knows the
         odometry at each beam; None: de-skewed by the velocity, as for the window.
         lifted: the wheels hang in the air; events: what navigation found out since the scan before.
+        Raises BadSample when the pose of the odometry is no number.
         """
+        if not np.isfinite(odometry.T_odom_base).all():
+            raise BadSample(f"Odometry.T_odom_base: must be finite, is {odometry.T_odom_base.tolist()}")
         if lifted:  # nothing is mapped there
             self._watch.lift(scan.stamp_s)
             self._disown()

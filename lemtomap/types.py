@@ -13,22 +13,30 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.samples import as_pose, as_row
 from lemtomap.se2 import Pose
 
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Where the wheels (and gyro) say the base is."""
+    """Where the wheels (and gyro) say the base is. Lists and tuples will do; raises BadSample."""
 
     stamp_s: float
     T_odom_base: Pose
+    """float64 (3,): x m, y m, yaw rad."""
     v_mps: float = 0.0
     w_radps: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_odom_base", as_pose("Odometry.T_odom_base", self.T_odom_base))
 
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """One turn of a planar laser. Beam i points to angle_min + i * angle_step at stamp + i * time_step."""
+    """One turn of a planar laser. Beam i points to angle_min + i * angle_step at stamp + i * time_step.
+
+    Lists and tuples will do; raises BadSample.
+    """
 
     stamp_s: float
     """Time of the first beam."""
@@ -43,6 +51,10 @@ class Scan:
     """A beam that saw nothing (+inf) proves free space only so far: a URG-04LX overlooks dark and slanting
     surfaces much nearer than its range."""
     T_base_laser: Pose = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ranges_m", as_row("Scan.ranges_m", self.ranges_m, np.float32))
+        object.__setattr__(self, "T_base_laser", as_pose("Scan.T_base_laser", self.T_base_laser))
 
 
 @dataclass(frozen=True, slots=True)
