@@ -51,28 +51,30 @@ class SlamConfig:
     quality_memory: float = 0.05  # share of the newest match in the usual quality
     rival_gain: float = 0.15  # a pose far from odometry must be so much better
 
-    # odometry since the previous match: floor plus share of the motion; tight in translation, loose in
-    # rotation
+    # odometry since the previous match, until matches teach otherwise: floor plus share of the motion
     odometry_floor_m: float = 0.01
-    odometry_floor_rad: float = 0.02
+    odometry_floor_rad: float = 0.001
     odometry_m_per_m: float = 0.05
     odometry_rad_per_rad: float = 0.2
     odometry_m_per_rad: float = 0.02
     odometry_rad_per_m: float = 0.1
 
-    # what matches teach about the wheels, as a factor on the translation's standard deviation
+    # what matches teach about the odometry, as factors on its standard deviations: on the shares of one step,
     trust_memory: float = 0.01  # share of the newest match
-    trust_least: float = 1.0
+    trust_least: float = 0.2
     trust_most: float = 4.0
+    odometry_turns_rad: float = 0.01  # settings' share of a turn, above which a step tells about turning
 
-    # ... and about the heading, as a factor on how far it drifts where nothing is matched
-    heading_stretch_m: float = 1.0
+    # ... and on the drift of the heading over a stretch
+    heading_stretch_m: float = 3.6
+    heading_stretch_rad: float = 6.0
     heading_memory: float = 0.05  # share of the newest stretch
-    heading_least: float = 0.1
+    heading_least: float = 0.01  # a good gyro's: 0.5 mrad in a metre
+    heading_most: float = 2.0
 
     # drift of the window's frame: after so much travel or turning it is off by the error of one more match
-    renew_m: float = 1.2
-    renew_rad: float = 2.0
+    renew_m: float = 0.3
+    renew_rad: float = 0.5
 
     # particles
     sample_share: float = 0.1  # of the proposal's standard deviation that is sampled: a window closes no loop
