@@ -20,7 +20,6 @@ from lemtomap.grid.motion import (
     Uncertainty,
     between,
     compose,
-    odometry_uncertainty,
 )
 from lemtomap.grid.publish import SmoothCorrection
 from lemtomap.grid.scan import Beams, ScanPreparer
@@ -129,7 +128,7 @@ class Tracker(ABC):
         if not match.accepted:
             if self._known > self.config.new_ground_below:
                 return self._report(predicted, matched=False, integrated=False)
-            match = refused(predicted, odometry_uncertainty(self._pending, self.config))
+            match = refused(predicted, self._noise.prior(self._pending))
         self._moves = self._is_motion(between(self._T_grid_base, match.T_grid_base))
         self._T_grid_base, self._information = match.T_grid_base, match.information
         self._pending = np.zeros(3)

@@ -61,21 +61,11 @@ def between(T_w_a: Pose, T_w_b: Pose) -> Pose:
     return np.array(quotient(numbers(T_w_a), numbers(T_w_b)))
 
 
-def odometry_uncertainty(step: Pose, config: SlamConfig) -> Uncertainty:
-    """Return the error that the length and turn of a step allow."""
-    x, y, yaw = step.tolist()
-    way, turn = math.hypot(x, y), abs(yaw)
-    return Uncertainty(
-        config.odometry_floor_m + config.odometry_m_per_m * way + config.odometry_m_per_rad * turn,
-        config.odometry_floor_rad + config.odometry_rad_per_rad * turn + config.odometry_rad_per_m * way,
-    )
-
-
 def odometry_drift(step: Pose, config: SlamConfig) -> Uncertainty:
     """Return how far odometry drifts over a step, one standard deviation.
 
-    The errors of pieces as long as from one integration to the next are independent: a random walk. The
-    uncertainty above grows in proportion, for a match must find what one slip did.
+    The errors of pieces as long as from one integration to the next are independent: a random walk. What
+    one match must find grows in proportion, for it may be what one slip did.
     """
     x, y, yaw = step.tolist()
     pieces_m = math.hypot(x, y) * config.integrate_distance_m
