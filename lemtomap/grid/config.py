@@ -61,28 +61,31 @@ class SlamConfig:
     quality_memory: float = within(0.05, 0.001, 1.0)  # share of the newest match in the usual quality
     rival_gain: float = within(0.15, 0.0, 1.0)  # a pose far from odometry must be so much better
 
-    # odometry since the previous match: floor plus share of the motion; tight in translation, loose in
-    # rotation
+    # odometry since the previous match, until matches teach otherwise: floor plus share of the motion
     odometry_floor_m: float = within(0.01, 1e-4, 0.5)
-    odometry_floor_rad: float = within(0.02, 1e-4, 0.5)
+    odometry_floor_rad: float = within(0.001, 1e-4, 0.5)
     odometry_m_per_m: float = within(0.05, 1e-3, 2.0)
     odometry_rad_per_rad: float = within(0.2, 1e-3, 2.0)
     odometry_m_per_rad: float = within(0.02, 0.0, 1.0)
     odometry_rad_per_m: float = within(0.1, 0.0, 2.0)
 
-    # what matches teach about the wheels, as a factor on the translation's standard deviation
+    # what matches teach about the odometry, as factors on its standard deviations: on the shares of one step,
     trust_memory: float = within(0.01, 1e-4, 1.0)  # share of the newest match
-    trust_least: float = within(1.0, 0.1, 10.0)
+    trust_least: float = within(0.2, 0.01, 10.0)
     trust_most: float = within(4.0, 1.0, 100.0)
+    odometry_turns_rad: float = within(0.01, 1e-4, 1.0)
+    """Settings' share of a turn, above which a step tells about turning."""
 
-    # ... and about the heading, as a factor on how far it drifts where nothing is matched
-    heading_stretch_m: float = within(1.0, 0.1, 50.0)
+    # ... and on the drift of the heading over a stretch
+    heading_stretch_m: float = within(3.6, 0.1, 50.0)
+    heading_stretch_rad: float = within(6.0, 0.1, 100.0)
     heading_memory: float = within(0.05, 1e-3, 1.0)  # share of the newest stretch
-    heading_least: float = within(0.1, 0.01, 1.0)
+    heading_least: float = within(0.01, 1e-3, 1.0)  # a good gyro's: 0.5 mrad in a metre
+    heading_most: float = within(2.0, 1.0, 100.0)
 
     # drift of the window's frame: after so much travel or turning it is off by the error of one more match
-    renew_m: float = within(1.2, 0.1, 100.0)
-    renew_rad: float = within(2.0, 0.1, 100.0)
+    renew_m: float = within(0.3, 0.1, 100.0)
+    renew_rad: float = within(0.5, 0.1, 100.0)
 
     # particles
     sample_share: float = within(0.1, 0.0, 2.0)

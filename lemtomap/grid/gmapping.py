@@ -15,12 +15,7 @@ from lemtomap.grid.beams import Beams
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.mapper import Tracker, roll_and_integrate
 from lemtomap.grid.matching import ScanMatch, refused
-from lemtomap.grid.motion import (
-    between,
-    compose,
-    odometry_drift,
-    odometry_uncertainty,
-)
+from lemtomap.grid.motion import between, compose, odometry_drift
 from lemtomap.grid.window import Window
 from lemtomap.se2 import Pose
 
@@ -98,7 +93,7 @@ class RollingGmapping(Tracker):
         the best finds no fit none is weighed, else the luckiest of many chance fits would win.
         """
         step = between(self._particles[self._best].T_grid_base, tracked.T_grid_base)
-        uncertainty, drift = odometry_uncertainty(step, self.config), odometry_drift(step, self.config)
+        uncertainty, drift = self._noise.prior(step), odometry_drift(step, self.config)
         for index, particle in enumerate(self._particles):
             if index == self._best:
                 particle.T_grid_base = tracked.T_grid_base  # the best stays at the mode of its proposal

@@ -17,13 +17,10 @@ from lemtomap.grid.foreground import without_foreground
 from lemtomap.grid.kernels import matching as matching_kernels
 from lemtomap.grid.matching import Matcher, ScanMatch, refused
 from lemtomap.grid.motion import (
-    HeadingTrust,
+    OdometryNoise,
     Uncertainty,
-    WheelTrust,
     between,
     compose,
-    odometry_drift,
-    odometry_uncertainty,
 )
 from lemtomap.grid.publish import SmoothCorrection
 from lemtomap.grid.window import Scratch, Window, look_up
@@ -68,7 +65,7 @@ class Tracker(ABC):
         self._scratch = Scratch(config.cells)
         self._match = Matcher(config, self._tables)
         self._prepare = ScanPreparer()
-        self._trust, self._heading = WheelTrust(config), HeadingTrust(config)
+        self._noise = OdometryNoise(config)
         self._correction = SmoothCorrection(config)
         self._T_grid_base: Pose | None = None
         self._beams: Beams | None = None
@@ -130,13 +127,13 @@ class Tracker(ABC):
         match = self._track(beams, predicted, abs(float(step[2])))
         self._quality, self._diversity, self._covariance = match.quality, match.diversity, match.covariance
         if len(beams.hits) == 0:
-            drift = self._heading.narrow(odometry_drift(self._pending, self.config))
+            drift = self._noise.drift(self._pending)
             self._covariance = refused(predicted, drift).covariance
             return self._report(predicted, matched=False, integrated=self._see_floor(beams, predicted))
         if not match.accepted:
             if self._known > self.config.new_ground_below:
                 return self._report(predicted, matched=False, integrated=False)
-            match = refused(predicted, odometry_uncertainty(self._pending, self.config))
+            match = refused(predicted, self._noise.prior(self._pending))
         self._moves = self._is_motion(between(self._T_grid_base, match.T_grid_base))
         self._T_grid_base, self._information = match.T_grid_base, match.information
         self._pending = np.zeros(3)
@@ -200,13 +197,13 @@ class Tracker(ABC):
         nowhere.
         """
         config, window = self.config, self._window()
-        expected = odometry_uncertainty(self._pending, config)
-        uncertainty = self._trust.widen(expected)
-        leapt = turn_rad > config.large_turn_rad
-        match = self._match(beams, predicted, uncertainty, window, config.search_rad if leapt else 0.0)
+        expected = self._noise.prior(self._pending)
+        # wheels that have proven good turn fast without leaping
+        leapt = min(turn_rad, expected.sigma_rad / config.odometry_rad_per_rad) > config.large_turn_rad
+        match = self._match(beams, predicted, expected, window, config.search_rad if leapt else 0.0)
         if not leapt and self._contradicts_wheels(match, predicted):
             match = self._hear_wheels(beams, match, predicted, expected)
-        poor = match.quality < config.good_share * self._usual_quality
+        poor = match.quality < max(config.good_share * self._usual_quality, config.min_quality)
         self._known = window.known_share(beams, predicted) if poor else 1.0
         # after a leap, what ground lies under the hits is chance; else new ground speaks against no pose
         way_m = math.hypot(self._pending[0], self._pending[1])
@@ -216,9 +213,8 @@ class Tracker(ABC):
             match = self._look_round(beams, match, predicted, config.collapse_share * wanted, leapt=leapt)
         elif match.accepted and way_m > config.match_distance_m:
             change = match.T_grid_base - predicted
-            self._trust.learn(change, float(predicted[2]), match.information, expected)
-            turned, seen = float(wrap_angle(change[2])), float(match.information[2, 2])
-            self._heading.learn(turned, self._pending, seen, expected.sigma_rad)
+            change[2] = wrap_angle(change[2])
+            self._noise.learn(change, float(predicted[2]), self._pending, match.information)
         if match.accepted or not self._usual_quality:
             share = config.quality_memory if self._usual_quality else 1.0
             self._usual_quality += share * (match.quality - self._usual_quality)
@@ -260,7 +256,10 @@ class Tracker(ABC):
         # a lone wall fits any other
         sharp = [rival for rival in rivals if rival.diversity >= config.degenerate_below]
         best = max(sharp, key=lambda rival: rival.quality, default=match)
-        return best if best.quality > max(wanted, match.quality + config.rival_gain) else match
+        # a hit by chance is likelier where most beams see nothing
+        sees = len(beams.hits) / (len(beams.hits) + len(beams.cuts))
+        gain = sees * (best.quality - match.quality)
+        return best if best.quality > wanted and gain > config.rival_gain else match
 
     def _step_covariance(self, T_grid_base: Pose) -> NDArray[np.float64]:
         """Return how far the motion since the previous report may be wrong.

@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 from lemtomap.grid.config import SlamConfig
 from lemtomap.se2 import Pose
 
-SEES_WELL = 0.8  # share of the scan in a match along the way, from which on it judges the odometry
+SEES = 0.5  # information of the scan against the prediction's, from which on it judges the odometry
+FADES = 0.7  # from scan to scan, what a late stamp still means: half a second's worth at 10 Hz
+FIRST_STRETCHES = 2  # that the settings count for in the drift
+YAW = np.array([0.0, 0.0, 1.0])
+
+Information = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,21 +61,11 @@ def between(T_w_a: Pose, T_w_b: Pose) -> Pose:
     return np.array(quotient(numbers(T_w_a), numbers(T_w_b)))
 
 
-def odometry_uncertainty(step: Pose, config: SlamConfig) -> Uncertainty:
-    """Return the error that the length and turn of a step allow."""
-    x, y, yaw = step.tolist()
-    way, turn = math.hypot(x, y), abs(yaw)
-    return Uncertainty(
-        config.odometry_floor_m + config.odometry_m_per_m * way + config.odometry_m_per_rad * turn,
-        config.odometry_floor_rad + config.odometry_rad_per_rad * turn + config.odometry_rad_per_m * way,
-    )
-
-
 def odometry_drift(step: Pose, config: SlamConfig) -> Uncertainty:
     """Return how far odometry drifts over a step, one standard deviation.
 
-    The errors of pieces as long as from one integration to the next are independent: a random walk. The
-    uncertainty above grows in proportion, for a match must find what one slip did.
+    The errors of pieces as long as from one integration to the next are independent: a random walk. What
+    one match must find grows in proportion, for it may be what one slip did.
     """
     x, y, yaw = step.tolist()
     pieces_m = math.hypot(x, y) * config.integrate_distance_m
@@ -81,72 +76,110 @@ def odometry_drift(step: Pose, config: SlamConfig) -> Uncertainty:
     )
 
 
-class WheelTrust:
-    """Learns from the matches how much farther off this robot's odometry is along its way than the settings
-    say: slipping wheels, and stamps that do not fit the scans.
-    """
+class OdometryNoise:
+    """What this robot's wheels and gyro have proven to be worth, learnt from the matches while they tell.
 
-    def __init__(self, config: SlamConfig) -> None:
-        self._memory = config.trust_memory
-        self._bounds = config.trust_least**2, config.trust_most**2
-        self._variance_ratio = 1.0
-
-    def widen(self, uncertainty: Uncertainty) -> Uncertainty:
-        """Return the uncertainty of a step as experience has it."""
-        return Uncertainty(math.sqrt(self._variance_ratio) * uncertainty.sigma_m, uncertainty.sigma_rad)
-
-    def learn(
-        self, correction: Pose, heading_rad: float, information: NDArray[np.float64], uncertainty: Uncertainty
-    ) -> None:
-        """Take what a match changed of its prediction; information float64 (3, 3) of the scan alone, both in
-        grid. Only a scan that sees well along the way has a say. uncertainty: as the settings have it.
-        """
-        x, y = math.cos(heading_rad), math.sin(heading_rad)
-        seen = x * x * information[0, 0] + 2.0 * x * y * information[0, 1] + y * y * information[1, 1]
-        share = float(seen / (seen + 1.0 / self.widen(uncertainty).sigma_m ** 2))
-        if share < SEES_WELL:
-            return
-        innovation_m = float(x * correction[0] + y * correction[1]) / share
-        least, most = self._bounds
-        ratio = min((innovation_m / uncertainty.sigma_m) ** 2, 4.0 * most)
-        self._variance_ratio += self._memory * (ratio - self._variance_ratio)
-        self._variance_ratio = min(max(self._variance_ratio, least), most)
-
-
-class HeadingTrust:
-    """Learns from the matches by how much less this robot's heading drifts than the settings allow: a gyro's
-    by a tenth of what wheels do.
-
-    One match errs by as much as a gyro does over metres; what the corrections of a stretch add up to tells.
+    Two scales tell odometry's errors apart. Stamps that do not fit the scans and wheels that slip show in
+    one match, as a share of the motion. Drift of the heading shows in what the matches of a stretch add up
+    to: one match errs by as much as a gyro does over metres, but the errors of matches do not add up.
     """
 
     def __init__(self, config: SlamConfig) -> None:
         self._config = config
-        self._variance_ratio = 1.0
-        self._corrected_rad = self._allowed = self._way_m = 0.0
+        self._way_ratio = self._turn_ratio = self._drift_ratio = 1.0  # variances, against the settings'
+        self._way_m = self._turn_rad = 0.0  # of a step lately: a late stamp shows in the steps after it too
+        self._corrected_rad = self._allowed = self._stretch = 0.0
+        self._stretches = FIRST_STRETCHES
 
-    def narrow(self, drift: Uncertainty) -> Uncertainty:
-        """Return the drift of a stretch as experience has it."""
-        return Uncertainty(drift.sigma_m, math.sqrt(self._variance_ratio) * drift.sigma_rad)
+    def drift(self, step: Pose) -> Uncertainty:
+        """Return how far odometry drifts over a stretch, one standard deviation."""
+        drift = odometry_drift(step, self._config)
+        return Uncertainty(drift.sigma_m, math.sqrt(self._drift_ratio) * drift.sigma_rad)
 
-    def learn(self, correction_rad: float, step: Pose, information_rad: float, sigma_rad: float) -> None:
-        """Take what a match changed of the heading that a step predicted.
+    def prior(self, step: Pose) -> Uncertainty:
+        """Return how far the prediction of one match may be off, one standard deviation."""
+        share = self._shares(step)
+        drift_rad = self.drift(step).sigma_rad
+        return Uncertainty(
+            math.sqrt(self._config.odometry_floor_m**2 + self._way_ratio * share.sigma_m**2),
+            math.sqrt(
+                self._config.odometry_floor_rad**2 + drift_rad**2 + self._turn_ratio * share.sigma_rad**2
+            ),
+        )
 
-        information_rad: the scan's alone, 1/rad^2; sigma_rad: how far the match let it differ. A scan that
-        does not see the heading well ends the stretch untold.
+    def learn(self, correction: Pose, heading_rad: float, step: Pose, information: Information) -> None:
+        """Take what a match changed of the prediction after a step.
+
+        correction (3,) and information (3, 3) of the scan alone, both in grid; heading_rad as predicted.
+        Only a direction in which the scan sees has a say.
         """
-        share = information_rad / (information_rad + 1.0 / sigma_rad**2)
-        if share < SEES_WELL:
-            self._start()
-            return
-        self._corrected_rad += correction_rad / share
-        self._allowed += odometry_drift(step, self._config).sigma_rad ** 2
-        self._way_m += math.hypot(step[0], step[1])
-        if self._way_m >= self._config.heading_stretch_m:
-            ratio = self._corrected_rad**2 / self._allowed
-            self._variance_ratio += self._config.heading_memory * (ratio - self._variance_ratio)
-            self._variance_ratio = min(max(self._variance_ratio, self._config.heading_least**2), 1.0)
-            self._start()
+        prior, share = self.prior(step), self._shares(step)
+        variance = np.array([prior.sigma_m**2, prior.sigma_m**2, prior.sigma_rad**2])
+        pull = information @ correction + correction / variance
+        along = np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
+        if along @ information @ along * prior.sigma_m**2 > SEES:
+            own = self._way_ratio * share.sigma_m**2
+            ratio = _surprise(along, pull, information, variance, own) / share.sigma_m**2
+            self._way_ratio = self._moved(self._way_ratio, ratio)
+        if (
+            information[2, 2] * prior.sigma_rad**2 > SEES
+            and share.sigma_rad > self._config.odometry_turns_rad
+        ):
+            own = self._turn_ratio * share.sigma_rad**2
+            ratio = _surprise(YAW, pull, information, variance, own) / share.sigma_rad**2
+            self._turn_ratio = self._moved(self._turn_ratio, ratio)
+        self._end_step(float(correction[2]), step)
 
-    def _start(self) -> None:
-        self._corrected_rad = self._allowed = self._way_m = 0.0
+    def _shares(self, step: Pose) -> Uncertainty:
+        """Return what the settings allow as a share of the motion, of this step or of one lately."""
+        config = self._config
+        x, y, yaw = step.tolist()
+        way, turn = max(math.hypot(x, y), self._way_m), max(abs(yaw), self._turn_rad)
+        return Uncertainty(
+            config.odometry_m_per_m * way + config.odometry_m_per_rad * turn,
+            config.odometry_rad_per_rad * turn,
+        )
+
+    def _moved(self, ratio: float, newest: float) -> float:
+        """Return a ratio with the newest match taken in, within bounds."""
+        least, most = self._config.trust_least**2, self._config.trust_most**2
+        newest = min(max(newest, 0.0), 4.0 * most)
+        return min(max(ratio + self._config.trust_memory * (newest - ratio), least), most)
+
+    def _end_step(self, corrected_rad: float, step: Pose) -> None:
+        """Let the step pass into the stretch, and the stretch into the drift when it is long enough."""
+        config = self._config
+        x, y, yaw = step.tolist()
+        way_m, turn_rad = math.hypot(x, y), abs(yaw)
+        self._way_m, self._turn_rad = max(way_m, FADES * self._way_m), max(turn_rad, FADES * self._turn_rad)
+        self._corrected_rad += corrected_rad
+        self._allowed += odometry_drift(step, config).sigma_rad ** 2
+        self._stretch += way_m / config.heading_stretch_m + turn_rad / config.heading_stretch_rad
+        if self._stretch < 1.0:
+            return
+        # one slip is not what the heading drifts by from now on
+        ratio = min(self._corrected_rad**2 / self._allowed, 9.0 * self._drift_ratio)
+        self._stretches += 1
+        memory = max(config.heading_memory, 1.0 / self._stretches)
+        self._drift_ratio += memory * (ratio - self._drift_ratio)
+        self._drift_ratio = min(max(self._drift_ratio, config.heading_least**2), config.heading_most**2)
+        self._corrected_rad = self._allowed = self._stretch = 0.0
+
+
+def _surprise(
+    axis: NDArray[np.float64],
+    pull: NDArray[np.float64],
+    information: Information,
+    variance: NDArray[np.float64],
+    own: float,
+) -> float:
+    """Return the variance along one axis that explains how hard the scan pulls there.
+
+    The pull of a scan at the prediction has the variance H + H Q H: that of the scan's own noise, of the
+    other errors of the prediction (diagonal Q), and of the one asked for, whose present guess `own` is left
+    out.
+    """
+    row = information @ axis
+    seen = float(axis @ row)
+    expected = seen + float(row @ (variance * row)) - own * seen * seen
+    return (float(axis @ pull) ** 2 - expected) / (seen * seen)

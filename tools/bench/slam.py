@@ -1,8 +1,8 @@
 """Accuracy, spread, CPU and memory of the metric layer: the whole table, each figure with its seeds.
 
     lemtomap bench slam [--data DIR] [--quick]       everything; a quarter of an hour on a quiet core
-    lemtomap bench slam corridor kernels             some of it: logs corridor drives kernels real-time memory
-                                                     first-use
+    lemtomap bench slam corridor kernels             some of it: logs corridor sparse drives kernels real-time
+                                                     memory first-use
     lemtomap bench slam logs --slam window --seeds 20
 
 DIR holds LOG.clf.xz and LOG.relations of the recorded logs; without it that part is left out and said so.
@@ -16,15 +16,16 @@ import time
 from pathlib import Path
 
 from lemtomap.grid import SLAMS
-from tools.bench.slam_parts import (
-    corridor,
-    costs,
-    drives,
-    logs,
-)
+from tools.bench.slam_parts import corridor, costs, drives, logs, sparse
 from tools.bench.slam_parts.figures import Figure, markdown
 
-PARTS = {"logs": logs.figures, "corridor": corridor.figures, "drives": drives.figures, **costs.PARTS}
+PARTS = {
+    "logs": logs.figures,
+    "corridor": corridor.figures,
+    "sparse": sparse.figures,
+    "drives": drives.figures,
+    **costs.PARTS,
+}
 
 
 def _options(arguments: list[str]) -> argparse.Namespace:

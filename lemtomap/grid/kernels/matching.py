@@ -21,6 +21,8 @@ Pair = tuple[float, float]
 NONE = 255
 WHOLE = 65535.0
 LIFTS = 254.0
+CORRELATED = 4.0  # beams err together: so many count as one
+VAGUE = 100.0  # times a beam's variance: a scan that says next to nothing
 
 
 @njit(nogil=True, cache=True)
@@ -36,8 +38,9 @@ def _linearise(
     H: Array,
     b: Array,
 ) -> float:
-    """Sum the normal equations of the match at pose; return (weight of matched points, weighted surface
-    spread).
+    """Sum the normal equations of the match at pose; return the weight of matched points.
+
+    b (4,): the right-hand side, and the variance of one point.
     """
     mean, nearest, normal, origin = window.mean, window.nearest, window.normal, window.origin
     whence = window.whence
@@ -54,7 +57,8 @@ def _linearise(
     base_x, base_y = pose[0] - corner_x, pose[1] - corner_y
     per_metre, per_whole, per_lift = 1.0 / resolution, resolution / WHOLE, resolution / LIFTS
     scale = -0.5 / (sigma * sigma)
-    hxx = hxy = hyy = hxt = hyt = htt = bx = by = bt = 0.0
+    hxx = hxy = hyy = hxt = hyt = htt = bx = by = bt = bend = pull = 0.0
+    per_square = 1.0 / (sigma * sigma)
     for i in range(points.shape[0]):
         rx = c * points[i, 0] - s * points[i, 1]
         ry = s * points[i, 0] + c * points[i, 1]
@@ -96,15 +100,20 @@ def _linearise(
             ex += off * nx
             ey += off * ny
             wxx, wxy, wyy = w * nx * nx, w * nx * ny, w * ny * ny
+            square = (nx * ex + ny * ey) ** 2
         elif not math.isnan(normals_rad[i]):
             nx, ny = math.cos(normals_rad[i] + pose[2]), math.sin(normals_rad[i] + pose[2])
             if is_other_face(nx, ny, whence[at_row, at_col], laser_x - rx, laser_y - ry):
                 continue
             wxx, wxy, wyy = w * nx * nx, w * nx * ny, w * ny * ny
+            square = (nx * ex + ny * ey) ** 2
         else:
             wxx = wyy = point_weight * w
             wxy = 0.0
+            square = 0.5 * (ex * ex + ey * ey)
         total += w
+        bend += w * (1.0 - square * per_square)
+        pull += w * w * square
         jx, jy = -ry, rx
         gx, gy = wxx * ex + wxy * ey, wxy * ex + wyy * ey
         hxx += wxx
@@ -120,7 +129,22 @@ def _linearise(
     H[1, 0], H[1, 1], H[1, 2] = hxy, hyy, hyt
     H[2, 0], H[2, 1], H[2, 2] = hxt, hyt, htt
     b[0], b[1], b[2] = bx, by, bt
+    b[3] = variance(total, bend, pull, rules.noise_m)
     return total
+
+
+@njit(nogil=True, cache=True)
+def variance(total: float, bend: float, pull: float, noise_m: float) -> float:
+    """Return the variance, m^2, that makes the information of a match honest: of a robust estimate it is the
+    squared pull of all points over the square of their slope (Huber 1981). total: sum of weights.
+
+    Where the window explains what is seen, that is the noise of a beam. Before a hedge most points lie on the
+    far side of the robust weight, where the slope fades and then turns: little is left of what they say.
+    """
+    least, most = noise_m * noise_m, VAGUE * noise_m * noise_m
+    if bend <= 0.0:
+        return most
+    return min(max(CORRELATED * pull * total / (bend * bend), least), most)
 
 
 @njit(nogil=True, cache=True)
@@ -202,15 +226,15 @@ def _refine(
     """Gauss-Newton from pose (changed in place); H gets the match's own information; return (quality,
     diversity).
     """
-    b = np.empty(3)
+    b = np.empty(4)
     A = np.empty((3, 3))
     g = np.empty(3)
     step = np.empty(3)
-    per_variance = 1.0 / (rules.noise_m * rules.noise_m)
     sigma = rules.sigma_m
     width = 2.0 * sigma
     for _ in range(rules.newton_rounds):
         total = _linearise(points, normals_rad, laser, pose, window, tables, rules, width, H, b)
+        per_variance = 1.0 / b[3]
         _gate(H, b, rules.degenerate_below)
         dx, dy = prior[0] - pose[0], prior[1] - pose[1]
         dt = (prior[2] - pose[2] + math.pi) % (2.0 * math.pi) - math.pi
@@ -235,6 +259,7 @@ def _refine(
         elif small:
             break
     total = _linearise(points, normals_rad, laser, pose, window, tables, rules, sigma, H, b)
+    per_variance = 1.0 / b[3]
     diversity = _gate(H, b, rules.degenerate_below)
     for i in range(3):
         for j in range(3):

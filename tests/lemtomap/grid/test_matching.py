@@ -34,7 +34,7 @@ def test_the_normal_equations_are_the_twin_s(beams):
     window, pose = filled(beams), np.array([0.05, -0.04, 0.32])
     seen = beams_at((0.07, -0.02, 0.3), beams)
     rules = Matcher(CONFIG, TABLES)._rules
-    H, b = np.empty((3, 3)), np.empty(3)
+    H, b = np.empty((3, 3)), np.empty(4)
     total = matching._linearise(
         seen.hits,
         seen.normals_rad,
@@ -52,7 +52,7 @@ def test_the_normal_equations_are_the_twin_s(beams):
     )
     assert wanted[2] > 0.3 * len(seen.hits)
     assert pytest.approx(wanted[0], rel=1e-4, abs=1e-3) == H
-    assert pytest.approx(wanted[1], rel=1e-3, abs=1e-4) == b
+    assert pytest.approx(wanted[1], rel=1e-3, abs=1e-4) == b[:3]
     assert total == pytest.approx(wanted[2], rel=1e-4)
 
 
@@ -66,6 +66,22 @@ def test_the_gate_weighs_only_the_weak_axis_and_does_so_bit_by_bit(across):
     assert matching._gate(H, b, 0.08) == pytest.approx(diversity)
     assert pytest.approx(H_wanted, abs=1e-9) == H
     assert pytest.approx(b_wanted, abs=1e-9) == b
+
+
+def test_a_scan_says_little_of_what_the_window_explains_badly():
+    """Returns of a hedge lie anywhere: as heavy as a wall's, and without a slope."""
+    rng, sigma = np.random.default_rng(0), 0.05
+
+    def variance(off_m):
+        w = np.exp(-0.5 * (off_m / sigma) ** 2)
+        bend = (w * (1.0 - (off_m / sigma) ** 2)).sum()
+        return matching.variance(w.sum(), bend, ((w * off_m) ** 2).sum(), 0.01)
+
+    wall, hedge = variance(0.01 * rng.standard_normal(5000)), variance(rng.uniform(-0.12, 0.12, 5000))
+    assert wall == pytest.approx(matching.CORRELATED * 0.01**2, rel=0.2)
+    assert hedge > 20.0 * wall
+    assert variance(np.full(10, 0.1)) == pytest.approx(matching.VAGUE * 0.01**2)
+    assert variance(np.zeros(10)) == pytest.approx(0.01**2)
 
 
 THIN = box(-1.5, -0.06, 1.5, 0.06)
