@@ -43,8 +43,9 @@ class Building:
         for truth, odometry, scan in drive(path, walls, seed=2, odometry_noise=0.05, **kinds):
             mapped = self.mapper.update(scan, odometry)
             if mapped.used:
-                T_base_node = inverse(self.topo.T_node_base)
-                self.born.setdefault(self.topo.associated_id, compose(truth, T_base_node))
+                for node_id, standing in self.topo.local.standings.items():
+                    T_base_node = between(mapped.slam.T_grid_base, standing.T_grid_node)
+                    self.born.setdefault(node_id, compose(truth, T_base_node))
             yield truth, mapped
 
     def closures(self):
