@@ -24,6 +24,14 @@ COLOURS = {
     Surface.FLOOR: "#dfe8d8",
 }
 INCHES_LONG = 8.0
+LABEL: dict[str, Any] = {
+    "ha": "center",
+    "va": "center",
+    "fontsize": 6,
+    "color": "#2c6e49",
+    "clip_on": True,
+    "parse_math": False,  # a name may hold any signs
+}
 
 
 def save_picture(world: World, path: Path, track: NDArray[np.float64] | None = None) -> None:
@@ -59,7 +67,7 @@ def draw(world: World, axis: Any, track: NDArray[np.float64] | None = None) -> N
     for room in world.truth.rooms if len(world.truth.rooms) <= 30 else ():
         if room.level == 0:
             corners = np.array(room.outline)
-            axis.text(*corners.mean(axis=0), room.name, ha="center", va="center", fontsize=6, color="#2c6e49")
+            axis.text(*corners.mean(axis=0), room.name, **LABEL)
     for door in world.truth.doors:
         (ax, ay), (bx, by) = door.ends
         axis.plot([ax, bx], [ay, by], color="#2c6e49", lw=1)
@@ -71,7 +79,7 @@ def draw(world: World, axis: Any, track: NDArray[np.float64] | None = None) -> N
     if track is not None:
         axis.plot(track[:, 0], track[:, 1], color="#1f77b4", lw=0.8)
     axis.set_aspect("equal")
-    axis.set_title(f"{world.name}: {world.description}", fontsize=8)
+    axis.set_title(f"{world.name}: {world.description}", fontsize=8, parse_math=False)
     axis.tick_params(labelsize=6)
 
 

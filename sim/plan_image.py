@@ -16,7 +16,8 @@ from lemtomap.sim.errors import BadWorld
 from lemtomap.sim.plan_settings import Mode, PlanSettings
 from lemtomap.sim.text_file import require_file
 
-MAX_PIXELS = 36_000_000  # 300 m x 300 m at 0.05 m
+MAX_PIXELS = 25_000_000  # 250 m x 250 m at 0.05 m
+MAX_PLAIN_PIXELS = 4_000_000  # of PGM as text: read at a million a second
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF", "TIFF")  # others start programs, or are no drawings
 SAVED_UNKNOWN = 50  # 255 - 205: occupancy of what map savers draw for unknown, of 255
 NEAR = 10  # greys on either side that a distinct peak stands out from
@@ -81,7 +82,7 @@ def _read_image(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     except (Image.DecompressionBombError, MemoryError) as error:
         raise BadWorld(f"{path}: the image is too large") from error
     except UnidentifiedImageError as error:
-        raise BadWorld(f"{path}: not an image of a kind that is read ({', '.join(FORMATS)})") from error
+        raise BadWorld(f"{path}: not a readable image (none of {', '.join(FORMATS)})") from error
     except BadWorld:
         raise
     except Exception as error:  # Pillow's decoders let through whatever a damaged file makes them raise
@@ -94,6 +95,9 @@ def _check_size(path: Path, image: Image.Image) -> None:
         raise BadWorld(f"{path}: {cols} x {rows} pixels is no floor plan")
     if cols * rows > MAX_PIXELS:
         raise BadWorld(f"{path}: {cols} x {rows} pixels are too many, at most {MAX_PIXELS / 1e6:g} million")
+    decoders = [tile[0] for tile in getattr(image, "tile", ())]
+    if cols * rows > MAX_PLAIN_PIXELS and "ppm_plain" in decoders:
+        raise BadWorld(f"{path}: {cols} x {rows} pixels as text take too long; save it as binary PGM or PNG")
 
 
 def _brightness(path: Path, image: Image.Image) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

@@ -1,6 +1,8 @@
 """A pseudo-terminal that behaves like a USB serial port: raw, never hanging up, never blocking the device.
 
-As in a serial port's tty, what the last client leaves unread at its close reaches nobody.
+As in a serial port's tty, what the last client leaves unread at its close reaches nobody. The kernel would
+keep it, so the port drops it when it hears of the close; only a client that reopens and reads at that very
+moment may be faster.
 """
 
 import errno

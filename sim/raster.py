@@ -34,9 +34,9 @@ def merge_cells(occupied: NDArray[np.bool_]) -> list[tuple[int, int, int, int]]:
             cols = _run(np.asarray(left[row, col:]))
             rows = _run(np.asarray(left[row:, col]))
             if cols >= rows:
-                rows = _run(np.asarray(left[row:, col : col + cols].all(axis=1)))
+                rows = _run(np.asarray(left[row : row + rows, col : col + cols].all(axis=1)))
             else:
-                cols = _run(np.asarray(left[row : row + rows, col:].all(axis=0)))
+                cols = _run(np.asarray(left[row : row + rows, col : col + cols].all(axis=0)))
             left[row : row + rows, col : col + cols] = False
             rectangles.append((row, col, rows, cols))
             if len(rectangles) > MAX_BOXES:

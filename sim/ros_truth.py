@@ -4,7 +4,6 @@
 left); `doors.yaml` holds for each door its two corners in metres and the two rooms it is approached from.
 """
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from lemtomap.sim.text_file import read_yaml
 from lemtomap.sim.world import Door, GroundTruth, Room
 
 Point = tuple[float, float]
+FAR = 1e5  # pixels or metres
 
 
 def read_truth(folder: Path, upper_left_m: Point, resolution_m: float) -> GroundTruth:
@@ -42,7 +42,7 @@ def _rooms(path: Path, upper_left_m: Point, resolution_m: float) -> tuple[Room, 
 
 def _corners(name: object, flat: Any) -> list[Point]:
     """Return the corners of a room, pixels. Raises ValueError."""
-    corners = [(_finite(px), _finite(py)) for px, py in zip(flat[::2], flat[1::2], strict=True)]
+    corners = [(_coordinate(px), _coordinate(py)) for px, py in zip(flat[::2], flat[1::2], strict=True)]
     if len(corners) < 3:
         raise ValueError(f"room {shown(name)} has {len(corners)} corners")
     return corners
@@ -56,15 +56,15 @@ def _doors(path: Path) -> list[Door]:
             if len(set(sides)) != 2:
                 continue  # a lift or an outer door: nothing drawn beyond it
             (ax, ay), (bx, by) = entry["door_corner_pt_1"], entry["door_corner_pt_2"]
-            ends = ((_finite(ax), _finite(ay)), (_finite(bx), _finite(by)))
+            ends = ((_coordinate(ax), _coordinate(ay)), (_coordinate(bx), _coordinate(by)))
             doors.append(Door(str(entry.get("name", number)), ends, (sides[0], sides[1])))
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
         raise BadWorld(f"{path}: a door lacks its corners or approaches ({error})") from error
     return doors
 
 
-def _finite(value: Any) -> float:
+def _coordinate(value: Any) -> float:
     number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{shown(value)} is no coordinate")
+    if not abs(number) <= FAR:
+        raise ValueError(f"{shown(value)} is no coordinate of a building")
     return number

@@ -74,6 +74,8 @@ def grid_of(world: World) -> GridView:
 def run_metric(options: SimOptions, bar: Bar) -> dict[str, Any]:
     """Drive in lock-step; write and return the summary. Raises BadWorld, BadSetting."""
     world, points = worlds.load(options.world), parse_points(options.mission)
+    for remark in world.remarks:
+        bar.say(remark)
     if not options.fast:
         raise BadSetting("--nav metric: the baseline runs on the virtual clock only; add --fast")
     if options.out.exists() and not options.out.is_dir():

@@ -149,10 +149,10 @@ def test_ros_map_becomes_few_boxes_and_bad_ones_one_line(tmp_path):
     with pytest.raises(BadWorld, match=r"m\.pgm: no free space"):
         worlds.load(settings)
     image.write_bytes(b"hello")
-    with pytest.raises(BadWorld, match=r"m\.pgm: not an image"):
+    with pytest.raises(BadWorld, match=r"m\.pgm: not a readable image"):
         worlds.load(settings)
     settings.write_text(text.replace("0.05", "x"))
-    with pytest.raises(BadWorld, match=r"m\.pgm: not an image|must be a number"):
+    with pytest.raises(BadWorld, match=r"m\.pgm: not a readable image|must be a number"):
         worlds.load(settings)
 
 

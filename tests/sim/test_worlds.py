@@ -1,15 +1,18 @@
 """Worlds: what they promise as ground truth is there, and bad descriptions are one line."""
 
 import math
+import os
 
 import numpy as np
 import pytest
 from scipy import ndimage
 
+from lemtomap.sim import raster as raster_module
 from lemtomap.sim import worlds
 from lemtomap.sim.errors import BadWorld
 from lemtomap.sim.picture import save_picture
 from lemtomap.sim.raster import clearance_m
+from lemtomap.sim.world import Box
 
 HOME = """
 name = "home"
@@ -145,6 +148,66 @@ def test_bad_world_files_are_one_line_with_file_and_place(tmp_path, before, afte
 
 
 @pytest.mark.parametrize(
+    ("before", "after", "complaint"),
+    [
+        ("[8, 0], [8, 5]", "[8000, 0], [8000, 5000]", r"home\.toml: 8\d\d\d x 5\d\d\d m .* is too large"),
+        ("[8, 0], [8, 5]", "[1e8, 0], [1e8, 5]", r"home\.toml: something reaches more than 20 km"),
+        ("[8, 0], [8, 5]", "[1e308, 0], [8, 5]", r"home\.toml:5: .*'points' must be 2 numbers"),
+        ("[8, 0], [8, 5]", f"[{'9' * 500}, 0], [8, 5]", r"home\.toml:5: .*'points' must be 2 numbers"),
+        ("[8, 0], [8, 5]", f"[0x{'f' * 9000}, 0]", r"home\.toml:5: .*number of thousands of digits"),
+        ("[8, 0], [8, 5]", f"[{'9' * 9000}, 0]", r"home\.toml: not a readable TOML file"),
+        ("[8, 0], [8, 5]", ", ".join(["[8, 0], [8, 5]"] * 2500), r"home\.toml.*'points' has .* at most 4000"),
+        ('name = "home"', "name = " + "[" * 100_000, r"home\.toml: not a readable TOML file"),
+        ('name = "home"', 'name = "a\\u001b[2J"', r"home\.toml:2: 'name' must be one line"),
+        ('name = "home"', 'name = "home"\n"bad\\nkey" = 1', r"home\.toml.*unknown key 'bad key'"),
+        ('name = "hall"', "name = []", r"home\.toml:13: .*'name' must be one line"),
+        ('["kitchen", "hall"]', '["kitchen", 3]', r"home\.toml:18: .*'rooms' must be one line"),
+        ('kind = "sofa"', 'kind = ["sofa"]', r"home\.toml:21: .*'kind' must be one of"),
+        ("moved = [[1,", "moved = [[nan,", r"home\.toml:23: .*'moved' must be 4 numbers"),
+        ("[[furniture]]", "[[hole]]\nlow = [1, 1]\nhigh = [2, 2]\n" * 1001 + "[[furniture]]", "at most 1000"),
+        ('leaf = "swings"', 'leaf = "swings"\nperiod = inf', r"home\.toml:20: .*'period' must be a number"),
+    ],
+)
+def test_worlds_without_end_and_damaged_numbers_are_one_line_too(tmp_path, before, after, complaint):
+    path = tmp_path / "home.toml"
+    path.write_text(HOME.replace(before, after))
+    with pytest.raises(BadWorld, match=complaint) as caught:
+        worlds.load(path)
+    assert str(caught.value).isprintable()
+
+
+def test_a_world_file_that_is_a_pipe_or_too_long_is_refused_before_it_is_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    with pytest.raises(BadWorld, match=r"pipe\.toml: not a file"):
+        worlds.load(tmp_path / "pipe.toml")
+    (tmp_path / "long.toml").write_text(HOME + "#" * (1 << 20))
+    with pytest.raises(BadWorld, match=r"long\.toml: larger than 1 MB"):
+        worlds.load(tmp_path / "long.toml")
+
+
+def test_a_long_wall_askew_is_drawn_strip_by_strip_as_at_once(monkeypatch):
+    box = Box((40.0, 30.0, 0.5), (49.0, 0.06, 0.5), yaw_rad=0.64)
+    other = Box((0.0, 0.0, 0.5), (0.1, 0.1, 0.5))
+    at_once = raster_module.rasterise([box, other], (1.0, 5.0)).occupied
+    monkeypatch.setattr(raster_module, "STRIP_CELLS", 5000)
+    assert (raster_module.rasterise([box, other], (1.0, 5.0)).occupied == at_once).all()
+    monkeypatch.setattr(raster_module, "MAX_DRAWN_CELLS", 5000)
+    with pytest.raises(BadWorld, match="too many long walls askew"):
+        raster_module.rasterise([box, other], (1.0, 5.0))
+
+
+def test_room_to_stand_found_strip_by_strip_is_what_the_distances_say(monkeypatch):
+    raster = worlds.load("office").raster
+    monkeypatch.setattr(raster_module, "STRIP_CELLS", 5000)
+    assert (raster_module.roomy(raster, 0.45) == (clearance_m(raster) >= 0.45)).all()
+    for x, y in np.random.default_rng(0).uniform((-1, -1), (17, 11), (200, 2)):
+        row, col = raster.cell(x, y)
+        inside = 0 <= row < raster.free.shape[0] and 0 <= col < raster.free.shape[1]
+        roomy = inside and bool(clearance_m(raster)[row, col] >= 0.3)
+        assert raster_module.fits(raster, x, y, 0.3) == roomy
+
+
+@pytest.mark.parametrize(
     "name", ["office@0", "office#x", "office@x", "loop@2", "offices:5:x", "offices:99999", "gone.toml"]
 )
 def test_bad_names_are_refused(name):
@@ -171,6 +234,38 @@ def test_rooms_and_doors_beside_a_map_become_its_ground_truth(tmp_path):
     (tmp_path / "locations.yaml").write_text("locations: [a, b]\npolygons: []\n")
     with pytest.raises(BadWorld, match=r"locations\.yaml: locations and polygons do not fit"):
         worlds.load(tmp_path / "m.yaml")
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("locations.yaml", "locations: [a]\npolygons: [[0, 0, 1e300, 0, 30, 40]]\n"),
+        ("locations.yaml", "locations: [a]\npolygons: [[0, 0, 30, 0]]\n"),
+        ("locations.yaml", "locations: [a]\npolygons: [[0, 0, .nan, 0, 30, 40]]\n"),
+        ("locations.yaml", "locations: &a [*a]\n"),
+        ("locations.yaml", "[]\n"),
+        ("doors.yaml", "- 3\n"),
+        ("doors.yaml", "- {approach: [{from: a}, {from: b}], door_corner_pt_1: [0, .inf]}\n"),
+        ("doors.yaml", f"- {{approach: [{{from: a}}, {{from: b}}], door_corner_pt_1: [0, {'9' * 400}]}}\n"),
+    ],
+)
+def test_damaged_truth_beside_a_map_is_one_line(tmp_path, file, text):
+    grey = np.full((40, 60), 254, dtype=np.uint8)
+    (tmp_path / "m.pgm").write_bytes(b"P5\n60 40\n255\n" + grey.tobytes())
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n")
+    (tmp_path / "locations.yaml").write_text("locations: []\npolygons: []\n")
+    (tmp_path / "doors.yaml").write_text("[]\n")
+    (tmp_path / file).write_text(text)
+    with pytest.raises(BadWorld, match=file.replace(".", r"\.")) as caught:
+        worlds.load(tmp_path / "m.yaml")
+    assert str(caught.value).isprintable()
+
+
+def test_names_with_any_signs_can_be_drawn(tmp_path):
+    path = tmp_path / "home.toml"
+    path.write_text(HOME.replace('"kitchen"', r'"lab $\\foo$"'))
+    save_picture(worlds.load(path), tmp_path / "home.png")
+    assert (tmp_path / "home.png").stat().st_size > 1000
 
 
 def test_described_things_can_stand_in_a_ros_map(tmp_path):
