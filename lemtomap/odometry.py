@@ -7,7 +7,7 @@ learnt there and taken off everywhere.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,7 +59,6 @@ class OdometryConfig:
     """The gyro's drift is the mean over so much standing."""
     max_bias_radps: float = within(0.01, 0.0, 0.1)
     """From kobuki#371: "a couple of degrees a minute at worst", with a wide margin."""
-    noise: MotionNoise = field(default_factory=MotionNoise)
 
 
 class WheelGyroOdometry:

@@ -2,7 +2,8 @@
 
     own_parts_m: float = within(0.15, 0.0, 0.17, "further out it would be the world")
 
-Whoever reads settings from a file refuses what lies outside; documentation lists the ranges.
+Whoever reads settings from a file refuses what lies outside; documentation lists the ranges. A number without
+a range of its own may be a tenth of its default, ten times as much, or what lies between.
 """
 
 import dataclasses
@@ -14,6 +15,7 @@ from lemtomap.errors import BadSetting
 
 T = TypeVar("T")
 _KEY = "range"
+TENFOLD = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,16 @@ def within(default: T, low: float, high: float, why: str = "") -> T:
 def range_of(declared: "dataclasses.Field[Any]") -> Range | None:
     """Return the range of a field; None when it has none, for it is no number."""
     found: Range | None = declared.metadata.get(_KEY)
+    if found is None and isinstance(declared.default, int | float) and not isinstance(declared.default, bool):
+        return _tenfold(declared.default)
     return found
+
+
+def _tenfold(default: float) -> Range:
+    """Return a tenth to ten times a number; of a count at least 1."""
+    ends = sorted((default / TENFOLD, default * TENFOLD))
+    low = max(1, round(ends[0])) if isinstance(default, int) and default > 0 else ends[0]
+    return Range(low, ends[1])
 
 
 def check_ranges(settings: Any) -> None:

@@ -77,8 +77,10 @@ class BaseStep:
         self._odometry = WheelGyroOdometry(config.odometry)
         self._buffer = OdometryBuffer()
         self._mux, self._smoother = VelocityMux(), VelocitySmoother(config.smoother)
-        self._retreat, self._indicators = Retreat(), Indicators()
+        self._retreat, self._indicators = Retreat(config.retreat), Indicators()
         self._watchdog = Watchdog(exchange)
+        self._docking_config = config.docking
+        self._upside_down = config.laser.is_upside_down
         self._docking: Docking | None = None
         self._sample: KobukiSample | None = None
         self._last: Odometry | None = None
@@ -137,7 +139,7 @@ class BaseStep:
             self._docking = None
             self._mux.withdraw(DOCKING)
             return
-        self._docking = self._docking or Docking()
+        self._docking = self._docking or Docking(self._docking_config)
         output = self._docking.step(sample)
         self._exchange.docking.put(output)
         if output.finished:
@@ -170,7 +172,7 @@ class BaseStep:
     def _match_scans(self, now_s: float) -> None:
         """Give each scan its motion as soon as odometry covers its last beam."""
         while self._waiting:
-            scan = bridge.scan_of(self._waiting[0], self._T_base_laser)
+            scan = bridge.scan_of(self._waiting[0], self._T_base_laser, upside_down=self._upside_down)
             stamps_s = scan.stamp_s + scan.time_step_s * np.arange(len(scan.ranges_m))
             if self._last is None or self._last.stamp_s < stamps_s[-1]:
                 if now_s - self._waiting[0].arrival_s <= SCAN_PATIENCE_S:

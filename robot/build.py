@@ -34,10 +34,14 @@ def build_core(
     """Return a robot that maps into `map_path`, a new file or an existing map. Raises BadMap, BadSetting."""
     exchange = Exchange()
     known = map_path.exists()
-    store = (TopoStore.open if known else TopoStore.create)(map_path, durable=durable)
+    store = (TopoStore.open if known else TopoStore.create)(
+        map_path, durable=durable and config.topo.durable, commit_every_s=config.topo.commit_every_s
+    )
     if known:
         prune(store)
-    recogniser = None if slam == "gmapping" else LoopRecogniser()  # a growing grid is too large to search
+    recogniser = (
+        None if slam == "gmapping" else LoopRecogniser(config.loops)
+    )  # a growing grid is too large to search
     topo = TopoMapper(config.topo, store, recogniser=recogniser)
     mapping = MappingStep(Mapper(lambda: build_slam(slam, config, seed), topo), exchange)
     reader = partial(TopoReader, map_path, is_checked=True)

@@ -5,13 +5,15 @@ were swapped are refused in one line that names file, line, key, value and rule.
 """
 
 import dataclasses
+import difflib
+import math
 import re
 import tomllib
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import cache, partial
+from functools import cache, partial, reduce
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,7 +22,8 @@ from pydantic_core import PydanticCustomError
 
 from lemtomap.errors import BadSetting
 from lemtomap.grid.config import SlamConfig
-from lemtomap.nav.config import NavConfig
+from lemtomap.nav.config import ExploreConfig, NavConfig
+from lemtomap.nav.motion.collision import SKIN_M
 from lemtomap.odometry import OdometryConfig
 from lemtomap.robot.devices.ports import (
     HOKUYO,
@@ -29,10 +32,13 @@ from lemtomap.robot.devices.ports import (
     describe,
     matches_identity,
 )
+from lemtomap.robot.motion.docking import DockingConfig
+from lemtomap.robot.motion.retreat import ReflexConfig
 from lemtomap.robot.motion.safety import SafetyLimits
 from lemtomap.robot.motion.velocity import SmootherConfig
 from lemtomap.settings import Range, range_of, within
 from lemtomap.topo.config import TopoConfig
+from lemtomap.topo.loops.config import LoopConfig
 
 Key = tuple[str, ...]
 
@@ -49,15 +55,47 @@ class PortsConfig:
 class LaserConfig:
     """Where the laser sits on the base."""
 
-    x_m: float = within(0.0, -0.3, 0.3, "it stands on the base")
-    y_m: float = within(0.0, -0.3, 0.3, "it stands on the base")
+    x_m: float = within(0.0, -0.4, 0.4, "it stands on the base")
+    y_m: float = within(0.0, -0.4, 0.4, "it stands on the base")
     yaw_rad: float = within(0.0, -3.15, 3.15)
+    roll_deg: float = within(0.0, -180.0, 180.0)
+    """180: it hangs upside down; nothing between, for it must see level."""
+
+    def __post_init__(self) -> None:
+        if abs(self.roll_deg) not in {0.0, 180.0}:
+            raise BadSetting(f"roll_deg = {self.roll_deg:g}: must be 0 or 180, a laser looks level")
+
+    @property
+    def is_upside_down(self) -> bool:
+        """Whether its beams turn the other way round."""
+        return self.roll_deg != 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BodyConfig:
+    """The robot's body, said once: for planning, exploring, safety gate, near-neighbour edges and viewer."""
+
+    radius_m: float = within(0.18, 0.178, 0.4, "a Kobuki is 0.178 m round, and half a door is 0.4 m")
+    """Of the circle round all of it, whatever stands on the base."""
+
+
+SAID_ONCE: dict[Key, Key] = {
+    ("nav", "body", "radius_m"): ("body", "radius_m"),
+    ("topo", "robot_radius_m"): ("body", "radius_m"),
+    ("safety", "body_radius_m"): ("body", "radius_m"),
+    ("nav", "explore"): ("explore",),
+}
+"""Settings of the stages that follow from one of the robot's, and which."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotConfig:
-    """All a run can be told."""
+    """All a run can be told. What several stages need is said once, and reaches each of them from there.
 
+    Raises BadSetting when two settings do not go together.
+    """
+
+    body: BodyConfig = field(default_factory=BodyConfig)
     ports: PortsConfig = field(default_factory=PortsConfig)
     laser: LaserConfig = field(default_factory=LaserConfig)
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
@@ -66,6 +104,42 @@ class RobotConfig:
     nav: NavConfig = field(default_factory=NavConfig)
     safety: SafetyLimits = field(default_factory=SafetyLimits)
     smoother: SmootherConfig = field(default_factory=SmootherConfig)
+    explore: ExploreConfig = field(default_factory=ExploreConfig)
+    loops: LoopConfig = field(default_factory=LoopConfig)
+    docking: DockingConfig = field(default_factory=DockingConfig)
+    retreat: ReflexConfig = field(default_factory=ReflexConfig)
+
+    def __post_init__(self) -> None:
+        for stage, source in SAID_ONCE.items():
+            top = _with(getattr(self, stage[0]), stage[1:], _at(self, source))
+            object.__setattr__(self, stage[0], top)
+        _check_relations(self)
+
+
+def _at(config: Any, key: Key) -> Any:
+    return reduce(getattr, key, config)
+
+
+def _with(config: Any, key: Key, value: Any) -> Any:
+    """Return frozen settings with one of them, however deep, replaced."""
+    name, *rest = key
+    inner = _with(getattr(config, name), tuple(rest), value) if rest else value
+    return dataclasses.replace(config, **{name: inner})
+
+
+def _check_relations(config: RobotConfig) -> None:
+    """Refuse settings that do not go together, each by the key to change."""
+    radius_m, laser = config.body.radius_m, config.laser
+    away_m = math.hypot(laser.x_m, laser.y_m)
+    if away_m > radius_m:
+        raise _BadKey(
+            ("laser", "x_m"), f"{away_m:g} m from the middle is outside the body (radius {radius_m:g})"
+        )
+    if config.safety.side_margin_m >= SKIN_M:
+        rule = f"must be below the {SKIN_M:g} m that navigation keeps, or the gate holds what it steers past"
+        raise _BadKey(("safety", "side_margin_m"), f"{config.safety.side_margin_m:g} {rule}")
+    if config.safety.own_parts_m >= radius_m:
+        raise _BadKey(("safety", "own_parts_m"), f"{config.safety.own_parts_m:g} must be below body.radius_m")
 
 
 def load(path: Path, ports: ListPorts | None = None) -> RobotConfig:
@@ -100,7 +174,7 @@ def from_mapping(data: Mapping[str, Any]) -> RobotConfig:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = tuple(str(part) for part in first["loc"])
-        reason = "unknown key" if first["type"] == "extra_forbidden" else _reason(first)
+        reason = _unknown(key) if first["type"] == "extra_forbidden" else _reason(first)
         raise _BadKey(key, reason) from None
     built: RobotConfig = _build(RobotConfig, model, ())
     return built
@@ -108,11 +182,23 @@ def from_mapping(data: Mapping[str, Any]) -> RobotConfig:
 
 def to_mapping(config: Any) -> Any:
     """Return settings as plain nested values, for summary.json."""
+    if isinstance(config, RobotConfig):
+        return {
+            f.name: _stage_mapping(getattr(config, f.name), (f.name,)) for f in dataclasses.fields(config)
+        }
     if dataclasses.is_dataclass(config):
         return {f.name: to_mapping(getattr(config, f.name)) for f in dataclasses.fields(config)}
     if isinstance(config, Enum):
         return config.value
     return list(config) if isinstance(config, tuple) else config
+
+
+def _stage_mapping(config: Any, key: Key) -> Any:
+    """Return a stage's settings without those that are said elsewhere."""
+    if not dataclasses.is_dataclass(config):
+        return to_mapping(config)
+    names = [f.name for f in dataclasses.fields(config) if (*key, f.name) not in SAID_ONCE]
+    return {name: _stage_mapping(getattr(config, name), (*key, name)) for name in names}
 
 
 def key_lines(text: str) -> dict[Key, int]:
@@ -155,15 +241,40 @@ def _reason(error: Mapping[str, Any]) -> str:
     return f"{shown if len(shown) < 60 else 'value'} {rule}"
 
 
+def _unknown(key: Key) -> str:
+    """Return what is wrong with a key that no setting has: where it is said, or what may have been meant."""
+    if key in SAID_ONCE:
+        return f"unknown key; it is said once, by {'.'.join(SAID_ONCE[key])}"
+    known = {".".join(each): each for each in all_keys()}
+    near = difflib.get_close_matches(".".join(key), known, n=1, cutoff=0.5)
+    if not near:
+        near = difflib.get_close_matches(key[-1], [each[-1] for each in known.values()], n=1, cutoff=0.6)
+    return f"unknown key; is {near[0]} meant?" if near else "unknown key"
+
+
+def all_keys(cls: Any = RobotConfig, key: Key = ()) -> Iterator[Key]:
+    """Yield the key of each table and each setting that a file may hold."""
+    hints = typing.get_type_hints(cls)
+    for f in dataclasses.fields(cls):
+        inner = (*key, f.name)
+        if inner not in SAID_ONCE:
+            yield inner
+            if dataclasses.is_dataclass(hints[f.name]):
+                yield from all_keys(hints[f.name], inner)
+
+
 @cache
-def _model_of(cls: Any) -> type[BaseModel]:
+def _model_of(cls: Any, key: Key = ()) -> type[BaseModel]:
     """Return a pydantic model with the dataclass' fields, unknown keys forbidden."""
     hints = typing.get_type_hints(cls)
     fields: dict[str, Any] = {}
     for f in dataclasses.fields(cls):
+        inner = (*key, f.name)
+        if inner in SAID_ONCE:
+            continue
         made = f.default_factory is not dataclasses.MISSING
         default = f.default_factory() if f.default_factory is not dataclasses.MISSING else f.default
-        fields[f.name] = (_model_of(hints[f.name]) if made else _checked(hints[f.name], f), default)
+        fields[f.name] = (_model_of(hints[f.name], inner) if made else _checked(hints[f.name], f), default)
     model: type[BaseModel] = create_model(
         cls.__name__, __config__=ConfigDict(extra="forbid", arbitrary_types_allowed=True), **fields
     )
@@ -193,12 +304,16 @@ def _build(cls: Any, model: BaseModel, key: Key) -> Any:
     """Build the frozen dataclass; what its own checks refuse gets the table's name."""
     values = {}
     for f in dataclasses.fields(cls):
-        value = getattr(model, f.name)
         inner = (*key, f.name)
+        if inner in SAID_ONCE:
+            continue
+        value = getattr(model, f.name)
         hint = typing.get_type_hints(cls)[f.name]
         values[f.name] = _build(hint, value, inner) if isinstance(value, BaseModel) else value
     try:
         return cls(**values)
+    except _BadKey:
+        raise
     except (BadSetting, ValueError) as error:
         raise _BadKey(key, str(error)) from None
 

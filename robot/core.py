@@ -17,8 +17,6 @@ from lemtomap.robot.exchange import Exchange, TimedScan
 from lemtomap.robot.mapping import MappingStep
 from lemtomap.robot.navigating import NavigationStep
 
-NAVIGATION_PERIOD_S = 0.1  # design, section 4
-
 
 @dataclass(frozen=True, slots=True)
 class Samples:
@@ -66,7 +64,7 @@ class RobotCore:
         while self.map_one(0.0):
             pass
         if now_s >= self._navigate_at_s - 1e-6:
-            self._navigate_at_s = now_s + NAVIGATION_PERIOD_S
+            self._navigate_at_s = now_s + self.navigation.navigator.config.period_s
             self.navigate(now_s)
         return self.command(now_s)
 

@@ -119,27 +119,6 @@ class RecoveryConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class NavConfig:
-    """Everything the navigator can be told."""
-
-    body: BodyLimits = field(default_factory=BodyLimits)
-    costmap: CostmapConfig = field(default_factory=CostmapConfig)
-    dwa: DwaConfig = field(default_factory=DwaConfig)
-    route: RouteConfig = field(default_factory=RouteConfig)
-    recovery: RecoveryConfig = field(default_factory=RecoveryConfig)
-    period_s: float = within(0.1, 0.02, 0.2)  # control cycle, design section 4
-    plan_period_s: float = within(0.2, 0.05, 5.0)
-    """The field near the robot is renewed this often, as the thesis' local costmap."""
-    look_period_s: float = within(1.0, 0.1, 30.0)
-    """And the one over the whole window; the thesis' global plan: 1 Hz."""
-    goal_tolerance_m: float = within(0.12, 0.02, 1.0)  # thesis' DWA setting: 0.15
-    yaw_tolerance_rad: float = within(0.10, 0.01, 3.15)
-    turn_start_rad: float = within(1.05, 0.1, 3.15)
-    """Turn in place when the way starts further off than this (60 degrees)."""
-    turn_end_rad: float = within(0.30, 0.02, 3.15)
-
-
-@dataclass(frozen=True, slots=True)
 class ExploreConfig:
     """When an opening is worth a visit, and when exploration is over."""
 
@@ -160,3 +139,25 @@ class ExploreConfig:
     barred_attempts: int = 4  # ... when no open route led there: somebody stands in the only door
     linger_s: float = 1.5  # having arrived, the mapper gets this long to see
     sure_looks: int = 4  # looks without any opening before saying that all is explored
+
+
+@dataclass(frozen=True, slots=True)
+class NavConfig:
+    """Everything the navigator can be told."""
+
+    body: BodyLimits = field(default_factory=BodyLimits)
+    costmap: CostmapConfig = field(default_factory=CostmapConfig)
+    dwa: DwaConfig = field(default_factory=DwaConfig)
+    route: RouteConfig = field(default_factory=RouteConfig)
+    recovery: RecoveryConfig = field(default_factory=RecoveryConfig)
+    explore: ExploreConfig = field(default_factory=ExploreConfig)
+    period_s: float = within(0.1, 0.02, 0.2)  # control cycle, design section 4
+    plan_period_s: float = within(0.2, 0.05, 5.0)
+    """The field near the robot is renewed this often, as the thesis' local costmap."""
+    look_period_s: float = within(1.0, 0.1, 30.0)
+    """And the one over the whole window; the thesis' global plan: 1 Hz."""
+    goal_tolerance_m: float = within(0.12, 0.02, 1.0)  # thesis' DWA setting: 0.15
+    yaw_tolerance_rad: float = within(0.10, 0.01, 3.15)
+    turn_start_rad: float = within(1.05, 0.1, 3.15)
+    """Turn in place when the way starts further off than this (60 degrees)."""
+    turn_end_rad: float = within(0.30, 0.02, 3.15)

@@ -73,13 +73,14 @@ def deskewed_sighting(scan: Scan, T_odom_base_beams: Pose) -> nav.ObstacleSighti
     )
 
 
-def scan_of(seen: LaserScan, T_base_laser: Pose) -> Scan:
-    """Return a driver's scan as LEMTOMap takes it."""
+def scan_of(seen: LaserScan, T_base_laser: Pose, *, upside_down: bool = False) -> Scan:
+    """Return a driver's scan as LEMTOMap takes it; the beams of a laser upside down turn clockwise."""
+    way_round = -1.0 if upside_down else 1.0
     return Scan(
         stamp_s=seen.stamp_s,
         ranges_m=seen.ranges_m,
-        angle_min_rad=seen.angle_min_rad,
-        angle_step_rad=seen.angle_step_rad,
+        angle_min_rad=way_round * seen.angle_min_rad,
+        angle_step_rad=way_round * seen.angle_step_rad,
         time_step_s=seen.time_step_s,
         range_min_m=seen.range_min_m,
         range_max_m=seen.range_max_m,

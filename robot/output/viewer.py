@@ -75,6 +75,7 @@ class ViewerConfig:
     part_hz: float = 0.2  # how often the file's size is looked at
     flush_s: float = 2.0  # of wall time between two writes, unless somebody watches: each costs 1 kB a path
     close_s: float = 3.0  # for the last bytes to reach the file
+    body_m: float = 0.18  # radius of the robot as drawn
 
 
 class Viewer:
@@ -240,7 +241,11 @@ class Viewer:
         log = self._stream.log
         log("about", rr.TextDocument(ABOUT, media_type=rr.MediaType.MARKDOWN), static=True)
         body = rr.Cylinders3D(
-            lengths=[0.1], radii=[0.177], centers=[[0, 0, 0.05]], colors=[230, 57, 70], fill_mode="solid"
+            lengths=[0.1],
+            radii=[self._config.body_m],
+            centers=[[0, 0, 0.05]],
+            colors=[230, 57, 70],
+            fill_mode="solid",
         )
         log("grid/robot/body", body, static=True)
         nose = rr.Arrows3D(vectors=[[0.45, 0, 0]], origins=[[0, 0, 0.13]], radii=0.04, colors=[255, 255, 255])

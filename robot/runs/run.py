@@ -117,7 +117,7 @@ class Run:
                 self._spaces,
                 self.core,
                 self._teller,
-                RecordPlan(plan.title, recorded, plan.record_limit, live=plan.live),
+                RecordPlan(plan.title, recorded, plan.record_limit, plan.live, plan.config.body.radius_m),
             )
         except BaseException:
             self.core.close()

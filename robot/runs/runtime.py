@@ -23,7 +23,7 @@ from lemtomap.drivers.kobuki.driver import KobukiDriver
 from lemtomap.drivers.kobuki.session import KobukiEvent
 from lemtomap.drivers.port import BytePort
 from lemtomap.robot.clock import Clock, MonotonicClock, stamp_ns
-from lemtomap.robot.core import NAVIGATION_PERIOD_S, RobotCore, Samples
+from lemtomap.robot.core import RobotCore, Samples
 from lemtomap.robot.devices.indicators import Signal, signal_bytes
 from lemtomap.robot.devices.recording import (
     HOKUYO,
@@ -230,7 +230,7 @@ class Runtime:
         next_s = self.clock.now_s()
         while not self.stop.is_set():
             self.core.navigate(self.clock.now_s())
-            next_s = max(next_s + NAVIGATION_PERIOD_S, self.clock.now_s())
+            next_s = max(next_s + self.core.navigation.navigator.config.period_s, self.clock.now_s())
             self.stop.wait(next_s - self.clock.now_s())
 
     def _look(self) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lemtomap.odometry import (
+    MotionNoise,
     NotCovered,
     OdometryBuffer,
     OdometryConfig,
@@ -94,7 +95,7 @@ def test_buffer_says_what_it_does_not_cover(stamp_s):
 
 
 def test_covariance_grows_with_every_kind_of_motion_and_stays_a_covariance():
-    noise = OdometryConfig().noise
+    noise = MotionNoise()
     for motion in [(1.0, 0.0, 3.0), (0.0, 2.0, 4.0), (0.0, 0.0, 60.0), (3.0, 1.0, 9.0)]:
         small, large = noise.covariance(*motion), noise.covariance(*(2 * part for part in motion))
         assert np.all(np.linalg.eigvalsh(small) >= 0)

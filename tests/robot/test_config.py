@@ -1,16 +1,20 @@
 """Settings files: accepted as written or refused with line and key."""
 
+import ast
 import dataclasses
 import typing
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lemtomap.errors import BadSetting
 from lemtomap.robot import config
+from lemtomap.robot.devices import bridge
 from lemtomap.settings import range_of
+from tools.checks import house
 
 
 def write(tmp_path, text):
@@ -61,8 +65,8 @@ def test_what_a_run_used_can_be_read_back():
         ("[slam]\nparticles = true\n", ["robot.toml:2", "slam.particles", "True", "integer"]),
         ("[slam]\nmax_range_m = inf\n", ["robot.toml:2", "slam.max_range_m", "finite"]),
         (
-            "[nav.body]\nradius_m = 1e12\n",
-            ["robot.toml:2", "nav.body.radius_m", "1000000000000.0", "between 0.1 and 0.6"],
+            "[nav.body]\nv_max_mps = 1e12\n",
+            ["robot.toml:2", "nav.body.v_max_mps", "1000000000000.0", "between 0.05 and 0.7"],
         ),
         ("[safety\n", ["robot.toml", "line 1"]),
         (f"[safety]\nx = {'[' * 5000}", ["robot.toml", "nested too deep"]),
@@ -104,6 +108,8 @@ def numbers(cls=config.RobotConfig, table=()):
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
         hint = hints[field.name]
+        if (*table, field.name) in config.SAID_ONCE:
+            continue
         if dataclasses.is_dataclass(hint):
             yield from numbers(hint, (*table, field.name))
         elif {int, float} & {hint, *typing.get_args(hint)}:
@@ -166,3 +172,60 @@ def test_zero_is_taken_only_where_nothing_depends_on_it():
     assert {name for name in zeros if name.startswith(("safety", "smoother"))} == {"safety.own_parts_m"}
     assert len(zeros) < 60
     assert [name for name in zeros if refusal(tuple(name.split(".")), 0)] == []
+
+
+def test_the_body_is_said_once_and_reaches_every_stage(tmp_path):
+    loaded = config.load(write(tmp_path, "[body]\nradius_m = 0.3\n"))
+    assert loaded.nav.body.radius_m == loaded.topo.robot_radius_m == loaded.safety.body_radius_m == 0.3
+
+
+def test_exploration_is_set_in_its_own_table(tmp_path):
+    loaded = config.load(write(tmp_path, "[explore]\nattempts = 5\n[loops.locator]\nchecks = 4\n"))
+    assert loaded.nav.explore.attempts == 5
+    assert loaded.loops.locator.checks == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[nav.body]\nradius_m = 0.3\n", "nav.body.radius_m: unknown key; it is said once, by body.radius_m"),
+        ("[body]\nradius_m = 0.45\n", "half a door"),
+        ("[laser]\nx_m = 0.15\ny_m = 0.15\n", "laser.x_m: 0.212132 m from the middle is outside the body"),
+        ("[laser]\nroll_deg = 90\n", "roll_deg = 90: must be 0 or 180"),
+        ("[safety]\nside_margin_m = 0.02\n", "safety.side_margin_m: 0.02 must be below the 0.015 m"),
+        ("[safety]\nv_max = 1\n", "is safety.v_max_mps meant?"),
+        ("[saftey]\nv_max_mps = 1\n", "is safety meant?"),
+    ],
+)
+def test_settings_that_do_not_go_together_are_told_with_key_value_and_rule(tmp_path, text, words):
+    with pytest.raises(BadSetting) as caught:
+        config.load(write(tmp_path, text))
+    assert words in str(caught.value)
+    assert "robot.toml:" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_every_setting_is_read_by_somebody_outside_its_own_table():
+    reads = {
+        node.attr
+        for path in house.sources()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)
+    }
+    assert [".".join(key) for key in config.all_keys() if key[-1] not in reads] == []
+
+
+def test_a_laser_upside_down_sees_the_same_room():
+    seen = SimpleNamespace(
+        stamp_s=0.0,
+        ranges_m=np.array([1.0, 2.0, 3.0], np.float32),
+        angle_min_rad=-0.5,
+        angle_step_rad=0.4,
+        time_step_s=0.0,
+        range_min_m=0.02,
+        range_max_m=5.6,
+    )
+    upright = bridge.scan_of(seen, np.zeros(3))
+    hanging = bridge.scan_of(seen, np.zeros(3), upside_down=True)
+    angles = upright.angle_min_rad + upright.angle_step_rad * np.arange(3)
+    assert np.allclose(hanging.angle_min_rad + hanging.angle_step_rad * np.arange(3), -angles)

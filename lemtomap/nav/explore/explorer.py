@@ -81,8 +81,8 @@ class Explorer:
         config: ExploreConfig | None = None,
         nav: NavConfig | None = None,
     ) -> None:
-        self.config = config or ExploreConfig()
         self._nav = nav or NavConfig()
+        self.config = config or self._nav.explore
         self._costmap = Costmap(self._nav.costmap, self._nav.body)
         self._memory = SeenMemory()
         self._openings = Openings(self.config.least_size_m)

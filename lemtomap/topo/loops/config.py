@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from lemtomap.errors import BadSetting
+from lemtomap.settings import within
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,12 +15,14 @@ class SearchConfig:
     contradiction: int = -40  # score of a stored obstacle in space now seen free (an obstacle: 100)
     occupied_from: int = 40  # GridView occupancy that counts as an obstacle
     free_below: int = 25  # GridView occupancy that counts as seen free
-    levels: int = 6  # pyramid: the coarsest bound covers 2**5 cells = 3.2 m
+    levels: int = within(6, 1, 8)  # pyramid: the coarsest bound covers 2**5 cells = 3.2 m
     angle_reach_m: float = 5.0  # lever arm that sets the angle step: turning by one moves no point a cell
     least_score: float = 0.32  # of a perfect match, below which nothing is looked for
     distinct_m: float = 0.6  # a runner-up is another place when it is at least this far away
     distinct_rad: float = 0.3  # ... or turned by this
-    heap_blocks: int = 60_000  # 2 MB; a search that needs more is ambiguous and given up
+    heap_blocks: int = within(
+        60_000, 1_000, 600_000
+    )  # 2 MB; a search that needs more is ambiguous and given up
     nearest_m: float = 0.3  # reach of the fine alignment
     line_reach_m: float = 0.25  # neighbourhood a wall's direction is taken from
     residual_m: float = 0.05  # scale of the robust weight: one window cell

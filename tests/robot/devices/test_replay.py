@@ -197,8 +197,8 @@ def test_other_settings_than_the_run_s_are_told(run):
 
 def test_a_recording_is_mapped_with_the_configuration_of_its_run(run):
     recording = Recording.open(run)
-    recording.about["config"]["laser"]["x_m"] = 0.25
-    assert settings_for(recording, None, None).config.laser.x_m == 0.25
+    recording.about["config"]["laser"]["x_m"] = 0.15
+    assert settings_for(recording, None, None).config.laser.x_m == 0.15
 
 
 def test_a_recording_without_a_scan_is_refused_and_leaves_nothing(tmp_path):
