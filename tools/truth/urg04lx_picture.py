@@ -1,6 +1,6 @@
 """Draw docs/urg04lx.png: the maps of the rover's logs, side by side.
 
-python tools/urg04lx_picture.py ../shared/data/urg04lx/exp1.dat.xz ../shared/data/urg04lx/exp2.dat.xz
+python tools/truth/urg04lx_picture.py ../shared/data/urg04lx/exp1.dat.xz ../shared/data/urg04lx/exp2.dat.xz
 """
 
 import argparse
