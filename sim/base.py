@@ -10,8 +10,8 @@ from lemtomap.sim.body import (
     CLIFF_DROP_M,
     MAX_WHEEL_MPS,
     Body,
-    BodyConfig,
     BodyState,
+    SimulatedBody,
 )
 from lemtomap.sim.gyro import Gyro, GyroConfig
 from lemtomap.sim.kobuki import BaseReadings, FakeKobukiConfig, KobukiFirmware
@@ -43,7 +43,7 @@ class SimulatedBattery:
 class BaseConfig:
     """Everything about the base."""
 
-    body: BodyConfig = field(default_factory=BodyConfig)
+    body: SimulatedBody = field(default_factory=SimulatedBody)
     gyro: GyroConfig = field(default_factory=GyroConfig)
     firmware: FakeKobukiConfig = field(default_factory=FakeKobukiConfig)
     battery: SimulatedBattery = field(default_factory=SimulatedBattery)

@@ -22,7 +22,7 @@ WHEEL_TRAVEL_M = 0.02  # suspension travel before the switch says dropped
 
 
 @dataclass(frozen=True, slots=True)
-class BodyConfig:
+class SimulatedBody:
     """How imperfect this one robot is; sigmas are drawn once per seed."""
 
     motor_lag_s: float = 0.09
@@ -91,7 +91,7 @@ class Body:
     """One robot in one scene."""
 
     def __init__(
-        self, scene: Scene, spawn: Pose2, config: BodyConfig, rng: np.random.Generator, *, flat: bool
+        self, scene: Scene, spawn: Pose2, config: SimulatedBody, rng: np.random.Generator, *, flat: bool
     ) -> None:
         self._scene = scene
         self._config = config
