@@ -186,6 +186,9 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("where", nargs="*", help="folders or files, from the root of the checkout")
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--skip", type=int, default=0, help="the first of them, tried in a run that was cut off"
+    )
     parser.add_argument("--safety", action="store_true", help="the hand-made mutants of the safety chain")
     parser.add_argument("--only", default="", help="those whose name contains this")
     options = parser.parse_args(arguments)
@@ -206,7 +209,7 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2
-    chosen = [mutant for mutant in chosen if options.only in mutant.name]
+    chosen = [mutant for mutant in chosen if options.only in mutant.name][options.skip :]
     survivors = 0
     with tempfile.TemporaryDirectory() as name:
         sandbox = Sandbox(root, Path(name))
