@@ -9,7 +9,8 @@ a range of its own may be a tenth of its default, ten times as much, or what lie
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from itertools import pairwise
+from typing import Any, NoReturn, TypeVar
 
 from lemtomap.errors import BadSetting
 
@@ -60,7 +61,7 @@ def check_ranges(settings: Any) -> None:
     """Refuse a dataclass with a number outside its range, however it was made. Raises BadSetting."""
     for name, value, allowed in _numbers(settings):
         if value not in allowed:
-            raise BadSetting(f"{name} = {value}: must lie {allowed}")
+            refuse(f"must lie {allowed}", **{name: value})
 
 
 def _numbers(settings: Any) -> Iterator[tuple[str, float, Range]]:
@@ -68,3 +69,17 @@ def _numbers(settings: Any) -> Iterator[tuple[str, float, Range]]:
         allowed, value = range_of(declared), getattr(settings, declared.name)
         if allowed is not None and value is not None:
             yield declared.name, value, allowed
+
+
+def refuse(rule: str, **values: Any) -> NoReturn:
+    """Refuse these settings of a dataclass: raise BadSetting that names each with its value, and the rule."""
+    told = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+    raise BadSetting(f"{told}: {rule}", *values)
+
+
+def check_order(settings: Any, *names: str) -> None:
+    """Refuse settings of which one is above the one named after it. Raises BadSetting."""
+    for lower, upper in pairwise(names):
+        low, high = getattr(settings, lower), getattr(settings, upper)
+        if low > high:
+            refuse(f"{lower} must not be above {upper}", **{lower: low, upper: high})

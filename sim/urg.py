@@ -22,10 +22,19 @@ ANGLES_RAD: NDArray[np.float64] = np.array(
 
 
 @dataclass(frozen=True, slots=True)
+class Mounting:
+    """Where the sensor sits on the base."""
+
+    T_base_laser: Pose2 = (0.0, 0.0, 0.0)
+    upside_down: bool = False
+    """True: its beams turn clockwise."""
+
+
+@dataclass(frozen=True, slots=True)
 class UrgConfig:
     """The sensor and where it sits."""
 
-    T_base_laser: Pose2 = (0.0, 0.0, 0.0)
+    mounting: Mounting = field(default_factory=Mounting)
     height_m: float = 0.25
     """Above the floor: on the TurtleBot's second plate."""
     optics: OpticsConfig = field(default_factory=OpticsConfig)
@@ -108,8 +117,8 @@ class Urg:
         beams_s = self.started_s + np.arange(beams.start + FIRST_STEP, beams.stop + FIRST_STEP) * self._slit_s
         x, y, yaw = (np.interp(beams_s, stamps, poses[:, column]) for column in range(3))
         cos, sin = np.cos(yaw), np.sin(yaw)
-        dx, dy, mount_yaw = config.T_base_laser
-        angle = ANGLES_RAD[beams] + mount_yaw
+        dx, dy, mount_yaw = config.mounting.T_base_laser
+        angle = mount_yaw + ANGLES_RAD[beams] * (-1.0 if config.mounting.upside_down else 1.0)
         starts, directions = np.empty((len(yaw), 3)), np.empty((len(yaw), 3))
         starts[:, 0] = x + cos * dx - sin * dy
         starts[:, 1] = y + sin * dx + cos * dy

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from lemtomap.errors import BadSetting
-from lemtomap.settings import within
+from lemtomap.settings import check_order, refuse, within
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +20,7 @@ class BodyLimits:
     def __post_init__(self) -> None:
         for name in ("radius_m", "v_max_mps", "w_max_radps", "acceleration_mps2", "braking_mps2"):
             if not getattr(self, name) > 0.0:
-                raise BadSetting(f"navigation: {name} = {getattr(self, name)} must be above 0")
+                refuse("must be above 0", **{name: getattr(self, name)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,3 +160,7 @@ class NavConfig:
     turn_start_rad: float = within(1.05, 0.1, 3.15)
     """Turn in place when the way starts further off than this (60 degrees)."""
     turn_end_rad: float = within(0.30, 0.02, 3.15)
+
+    def __post_init__(self) -> None:
+        check_order(self, "turn_end_rad", "turn_start_rad")
+        check_order(self, "period_s", "plan_period_s", "look_period_s")

@@ -20,7 +20,8 @@ from lemtomap.robot.output.final_map import FinalMap, final_map
 from lemtomap.robot.output.onlooker import Onlooker
 from lemtomap.robot.output.overview import Overview, WallSketch, draw
 from lemtomap.robot.output.preview import draw_preview
-from lemtomap.robot.output.viewer import Viewer, ViewerConfig
+from lemtomap.robot.output.viewer import Viewer
+from lemtomap.robot.output.viewer_config import ViewerConfig
 from lemtomap.robot.runs.ending import Ending, reason_of
 from lemtomap.robot.runs.folder import RunFolder, Space
 from lemtomap.se2 import Pose
@@ -56,8 +57,7 @@ class RecordPlan:
     about: Mapping[str, Any] = field(default_factory=dict)
     limit_bytes: int = DEFAULT_LIMIT
     live: bool = False
-    body_m: float = 0.18
-    """Radius of the robot as drawn."""
+    viewer: ViewerConfig = field(default_factory=ViewerConfig)
 
 
 @dataclass(slots=True)
@@ -97,7 +97,7 @@ class RunFiles(Onlooker):
             folder.path / "run.rrd",
             lambda text: self.warn("viewer", text),
             live=record.live,
-            config=ViewerConfig(body_m=record.body_m),
+            config=record.viewer,
             limit_bytes=record.limit_bytes,
         )
         self._viewer = self._view

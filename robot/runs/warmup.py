@@ -54,7 +54,7 @@ def warm_up(config: RobotConfig, slam: str = DEFAULT_SLAM) -> None:
         way = _there_and_back()
         for poses in (way, way[:LOST_SCANS]):
             core = build_core(config, path, slam=slam, durable=False)
-            core.navigation.set_mission(Explore(config.nav))
+            core.navigation.set_mission(Explore())
             for index, T_world_base in enumerate(poses):
                 before = way[max(0, index - 1)]
                 turns = index % NAVIGATES_EACH == 0

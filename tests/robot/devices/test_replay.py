@@ -18,7 +18,7 @@ from lemtomap.robot.devices.recording import HOKUYO, KOBUKI, Recorder
 from lemtomap.robot.devices.replay import replay_events, replay_map
 from lemtomap.robot.devices.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
 from lemtomap.robot.output.progress import Bar
-from lemtomap.robot.runs.replayed import replay_run, settings_for
+from lemtomap.robot.runs.replayed import Changes, replay_run, settings_for
 from lemtomap.robot.runs.simulated import SimOptions, run_sim
 from lemtomap.sim import worlds
 from lemtomap.sim.errors import Unplugged
@@ -126,7 +126,7 @@ def test_scans_that_the_mapper_left_out_are_left_out_again(run, tmp_path):
     recording = Recording.open(run)
     kept = list(recording.scans())[::2]
     recording.scans = lambda: iter(kept)
-    settings = settings_for(recording, None, None)
+    settings = settings_for(recording)
     core = build_core(settings.config, tmp_path / "map.lemto", seed=settings.seed, durable=False)
     replay_map(recording, core, as_then=True)
     mapped = [mapped.stamp_s for mapped in core.exchange.mapped_scans.drain()]
@@ -185,20 +185,22 @@ def test_the_latest_parts_alone_can_be_replayed(tmp_path):
 
 def test_other_settings_than_the_run_s_are_told(run):
     recording = Recording.open(run)
-    assert settings_for(recording, None, None).as_then
-    assert settings_for(recording, "window", 3).as_then
-    assert "other settings" in settings_for(recording, "rolling", None).why_not
-    assert "other settings" in settings_for(recording, None, 4).why_not
+    assert settings_for(recording).as_then
+    assert settings_for(recording, Changes("window", 3)).as_then
+    assert "other settings" in settings_for(recording, Changes("rolling")).why_not
+    assert "other settings" in settings_for(recording, Changes(seed=4)).why_not
     recording.about["new_map"] = False
-    assert "went on with a map" in settings_for(recording, None, None).why_not
+    assert "went on with a map" in settings_for(recording).why_not
     recording.about["config"] = {"strange": 1}
-    assert "does not tell" in settings_for(recording, None, None).why_not
+    assert "cannot be used: strange: unknown key" in settings_for(recording).why_not
+    del recording.about["config"]
+    assert "does not tell" in settings_for(recording).why_not
 
 
 def test_a_recording_is_mapped_with_the_configuration_of_its_run(run):
     recording = Recording.open(run)
     recording.about["config"]["laser"]["x_m"] = 0.15
-    assert settings_for(recording, None, None).config.laser.x_m == 0.15
+    assert settings_for(recording).config.laser.x_m == 0.15
 
 
 def test_a_recording_without_a_scan_is_refused_and_leaves_nothing(tmp_path):
