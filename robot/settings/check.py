@@ -50,6 +50,8 @@ def _checked(setting: Setting, value: Any) -> Any:
     if value is None and setting.default is None:
         return None
     whole = isinstance(value, int) and not isinstance(value, bool)
+    if isinstance(value, Mapping):
+        raise BadKey(f"must be {WORDS[setting.kind]}, not a table", setting.key)
     fits = whole or isinstance(value, float) if setting.kind is float else type(value) is setting.kind
     if not fits:
         raise BadKey(f"{_shown(value)} must be {WORDS[setting.kind]}", setting.key)
