@@ -22,9 +22,9 @@ from typing import TextIO
 from lemtomap.sim import worlds
 from lemtomap.sim.errors import SimError, Unplugged
 from lemtomap.sim.link import HostPort
+from lemtomap.sim.mounting import Mounting
 from lemtomap.sim.pty_port import PtyPort
 from lemtomap.sim.simulator import STEP_S, Simulator
-from lemtomap.sim.urg import Mounting
 from lemtomap.sim.world import Pose2
 
 LATE_S = 0.25  # a machine this far behind gives up the lost time instead of racing after it

@@ -13,8 +13,9 @@ from lemtomap.sim.depth import DepthCamera, DepthConfig
 from lemtomap.sim.faults import Faults
 from lemtomap.sim.hokuyo import FakeHokuyoConfig, HokuyoFirmware
 from lemtomap.sim.link import HostPort, Link
+from lemtomap.sim.mounting import Mounting
 from lemtomap.sim.scene import Scene
-from lemtomap.sim.urg import Mounting, Urg, UrgConfig
+from lemtomap.sim.urg import Urg, UrgConfig
 from lemtomap.sim.world import World
 
 STEP_S = 0.010  # physics; at 0.7 m/s the body moves 7 mm

@@ -10,24 +10,15 @@ from numpy.typing import NDArray
 from lemtomap.sim.body import BodyState
 from lemtomap.sim.hokuyo import FIRST_STEP, FRONT_STEP, INITIAL_RPM, LAST_STEP, NOT_MEASURABLE, SLITS
 from lemtomap.sim.hokuyo_stream import STEPS
+from lemtomap.sim.mounting import Mounting
 from lemtomap.sim.optics import NOTHING, WEAK, BeamHits, OpticsConfig, measure
 from lemtomap.sim.scene import Scene
-from lemtomap.sim.world import Pose2
 
 BEAMS = LAST_STEP - FIRST_STEP + 1
 TRACK = 16  # physics steps remembered: more than one turn
 ANGLES_RAD: NDArray[np.float64] = np.array(
     [(step - FRONT_STEP) * 2 * math.pi / SLITS for step in range(FIRST_STEP, LAST_STEP + 1)]
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Mounting:
-    """Where the sensor sits on the base."""
-
-    T_base_laser: Pose2 = (0.0, 0.0, 0.0)
-    upside_down: bool = False
-    """True: its beams turn clockwise."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from lemtomap.errors import BadInput
 from lemtomap.robot.child import python
 from lemtomap.robot.config import RobotConfig
 from lemtomap.se2 import Pose, pose
-from lemtomap.sim.urg import Mounting
+from lemtomap.sim.mounting import Mounting
 
 END_S = 5.0  # for the server to tell the truth and go
 
