@@ -1,4 +1,4 @@
-"""A laser behind the axle, turned, upside down: its map is right all the same, as [laser] says where it is."""
+"""A laser behind the axle, turned or upside down: its map is right, for [laser] says where it is."""
 
 import math
 from types import SimpleNamespace
