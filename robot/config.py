@@ -11,8 +11,6 @@ from functools import reduce
 from typing import Any
 
 from lemtomap.baseline.config import AmclConfig
-from lemtomap.robot.output.viewer_config import ViewerConfig
-
 from lemtomap.errors import BadSetting
 from lemtomap.grid.config import SlamConfig
 from lemtomap.nav.config import ExploreConfig, NavConfig
@@ -22,6 +20,8 @@ from lemtomap.robot.motion.docking import DockingConfig
 from lemtomap.robot.motion.retreat import ReflexConfig
 from lemtomap.robot.motion.safety import SafetyLimits
 from lemtomap.robot.motion.velocity import SmootherConfig
+from lemtomap.robot.output.viewer_config import ViewerConfig
+from lemtomap.se2 import Pose, pose
 from lemtomap.settings import refuse, within
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.loops.config import LoopConfig
@@ -51,6 +51,11 @@ class LaserConfig:
     def __post_init__(self) -> None:
         if abs(self.roll_deg) not in {0.0, 180.0}:
             refuse("must be 0 or 180, a laser looks level", roll_deg=self.roll_deg)
+
+    @property
+    def T_base_laser(self) -> Pose:  # noqa: N802 - frames live in names
+        """Return where it is, float64 (3,): x m, y m, yaw rad, base frame."""
+        return pose(self.x_m, self.y_m, self.yaw_rad)
 
     @property
     def is_upside_down(self) -> bool:

