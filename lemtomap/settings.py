@@ -42,11 +42,15 @@ def within(default: T, low: float, high: float, why: str = "") -> T:
     return declared
 
 
-def range_of(declared: "dataclasses.Field[Any]") -> Range | None:
-    """Return the range of a field; None when it has none, for it is no number."""
+def range_of(declared: "dataclasses.Field[Any]", default: Any = None) -> Range | None:
+    """Return the range of a field; None when it has none, for it is no number.
+
+    default: where the table holds another than its dataclass says.
+    """
     found: Range | None = declared.metadata.get(_KEY)
-    if found is None and isinstance(declared.default, int | float) and not isinstance(declared.default, bool):
-        return _tenfold(declared.default)
+    usual = declared.default if default is None else default
+    if found is None and isinstance(usual, int | float) and not isinstance(usual, bool):
+        return _tenfold(usual)
     return found
 
 

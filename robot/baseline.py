@@ -45,4 +45,4 @@ def build_metric_core(
     localising = AmclStep(amcl, grid, exchange)
     navigation = NavigationStep(navigator, exchange, GridGraph)
     mapping = cast("MappingStep", localising)  # as far as the core is concerned
-    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)
+    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation, config.devices)

@@ -52,4 +52,4 @@ def build_core(
     mapping = MappingStep(Mapper(lambda: build_slam(slam, config, seed), topo), exchange)
     reader = partial(TopoReader, map_path, is_checked=True)
     navigation = NavigationStep(Navigator(config.nav), exchange, reader)
-    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)
+    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation, config.devices)

@@ -11,6 +11,9 @@ from functools import reduce
 from typing import Any
 
 from lemtomap.baseline.config import AmclConfig
+from lemtomap.drivers.driver import DriverConfig
+from lemtomap.drivers.hokuyo.session import HokuyoConfig
+from lemtomap.drivers.kobuki.session import KobukiConfig
 from lemtomap.errors import BadSetting
 from lemtomap.grid.config import SlamConfig
 from lemtomap.nav.config import ExploreConfig, NavConfig
@@ -22,7 +25,7 @@ from lemtomap.robot.motion.safety import SafetyLimits
 from lemtomap.robot.motion.velocity import SmootherConfig
 from lemtomap.robot.output.viewer_config import ViewerConfig
 from lemtomap.se2 import Pose, pose
-from lemtomap.settings import refuse, within
+from lemtomap.settings import Range, refuse, within
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.whole.pruning import PruneConfig
@@ -36,6 +39,25 @@ class PortsConfig:
 
     kobuki: str = ""
     hokuyo: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DevicesConfig:
+    """How the two devices are talked to."""
+
+    kobuki: KobukiConfig = field(default_factory=KobukiConfig)
+    hokuyo: HokuyoConfig = field(default_factory=HokuyoConfig)
+    waiting: DriverConfig = field(default_factory=DriverConfig)
+
+
+RANGES: dict[Key, Range] = {
+    ("devices", "hokuyo", "view", "angle_min_rad"): Range(-2.1, 2.1, "a URG-04LX sees 240 degrees"),
+    ("devices", "hokuyo", "view", "angle_max_rad"): Range(-2.1, 2.1, "a URG-04LX sees 240 degrees"),
+    ("devices", "hokuyo", "view", "cluster"): Range(1, 99),
+    ("devices", "hokuyo", "view", "skip"): Range(0, 9),
+    ("devices", "hokuyo", "view", "count"): Range(0, 99),
+}
+"""Of settings that cannot say it themselves: the drivers know nothing of files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +112,7 @@ class RobotConfig:
 
     body: BodyConfig = field(default_factory=BodyConfig)
     ports: PortsConfig = field(default_factory=PortsConfig)
+    devices: DevicesConfig = field(default_factory=DevicesConfig)
     laser: LaserConfig = field(default_factory=LaserConfig)
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     slam: SlamConfig = field(default_factory=SlamConfig)
@@ -176,3 +199,10 @@ def _relations(config: RobotConfig) -> Iterator[_Relation]:
         f"{period_s:g} {rule}",
         (("nav", "period_s"), ("safety", "cycle_age_s")),
     )
+    battery, key = config.devices.kobuki.battery, ("devices", "kobuki", "battery")
+    for low, high in (("critical_v", "low_v"), ("low_v", "full_v")):
+        yield _Relation(
+            getattr(battery, low) < getattr(battery, high),
+            f"{low} = {getattr(battery, low):g} must be below {high} = {getattr(battery, high):g}",
+            ((*key, low), (*key, high)),
+        )

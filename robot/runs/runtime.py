@@ -68,12 +68,11 @@ class Runtime:
         self.stop = threading.Event()
         """Set it from any thread to end the run."""
         record = onlooker.raw.put
-        self._kobuki = KobukiDriver(
-            ports.kobuki, self.clock.now_s, self._on_base, RecordedKobukiSession(record)
-        )
-        self._hokuyo = HokuyoDriver(
-            ports.hokuyo, self.clock.now_s, self._on_laser, RecordedHokuyoSession(record)
-        )
+        devices, now_s = core.devices, self.clock.now_s
+        base = RecordedKobukiSession(record, devices.kobuki)
+        laser = RecordedHokuyoSession(record, devices.hokuyo)
+        self._kobuki = KobukiDriver(ports.kobuki, now_s, self._on_base, base, devices.waiting)
+        self._hokuyo = HokuyoDriver(ports.hokuyo, now_s, self._on_laser, laser, devices.waiting)
         self._base_events: list[KobukiEvent] = []
         self._laser_events: list[HokuyoEvent] = []
         self._lost: list[str] = []

@@ -43,6 +43,8 @@ def _build(default: Any, data: Any, key: Key) -> Any:
         raise
     except BadSetting as error:
         raise BadKey(str(error), *((*key, name) for name in error.names), key) from None
+    except ValueError as error:  # a driver's
+        raise BadKey(str(error), key) from None
 
 
 def _checked(setting: Setting, value: Any) -> Any:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from lemtomap.robot.config import SAID_ONCE, Key, RobotConfig, value_at
+from lemtomap.robot.config import RANGES, SAID_ONCE, Key, RobotConfig, value_at
 from lemtomap.settings import Range, range_of
 
 UNITS = {
@@ -113,7 +113,8 @@ def _tables(key: Key, default: Any) -> Iterator[SettingTable]:
         if dataclasses.is_dataclass(value):
             inner.append((here, value))
         else:
-            plain.append(Setting(here, cls, _kind(hints[declared.name]), value, range_of(declared)))
+            allowed = RANGES.get(here) or range_of(declared, value)
+            plain.append(Setting(here, cls, _kind(hints[declared.name]), value, allowed))
     yield SettingTable(key, cls, tuple(plain))
     for here, value in inner:
         yield from _tables(here, value)

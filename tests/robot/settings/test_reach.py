@@ -13,9 +13,11 @@ from lemtomap.pipeline import Mapper
 from lemtomap.robot import build
 from lemtomap.robot.baseline import build_metric_core
 from lemtomap.robot.config import RobotConfig, value_at
+from lemtomap.robot.devices import replay
 from lemtomap.robot.missions.missions import parse_mission
 from lemtomap.robot.missions.relocalise import Finder
-from lemtomap.robot.runs import real, run
+from lemtomap.robot.runs import lockstep, real, run
+from lemtomap.robot.runs.runtime import Ports, Runtime
 from lemtomap.robot.settings.check import from_mapping
 from lemtomap.robot.settings.tree import all_settings, tables, to_mapping
 from lemtomap.topo.file.store import TopoStore
@@ -88,6 +90,9 @@ def stages(config, tmp_path_factory):
     metric = build_metric_core(config, grid, (0.0, 0.0, 0.0))
     taken += [metric.base, metric.mapping, metric.navigation, mission_of("explore", navigator)]
     taken += [Finder(navigator.config, 0.0), real.find_ports(config.ports)]
+    onlooker = SimpleNamespace(raw=SimpleNamespace(put=None))
+    runtime = Runtime(core, Ports(None, None), onlooker)
+    taken += [runtime._kobuki, runtime._hokuyo]
     return taken
 
 
@@ -178,3 +183,24 @@ def test_a_recorded_log_is_mapped_by_the_settings_it_is_given(config, tmp_path):
     assert held_there[type(config.topo)] == config.topo
     assert held_there[type(config.loops)] == config.loops
     topo.close()
+
+
+@pytest.mark.parametrize("build_robot", [build.build_core, build_metric_core], ids=["mapping", "metric"])
+def test_sessions_in_lockstep_and_of_a_replay_go_by_the_settings(config, tmp_path, monkeypatch, build_robot):
+    grid = GridView(0.0, np.zeros((40, 40), np.int8), 0.05, (-1.0, -1.0))
+    arguments = (tmp_path / "map.lemto",) if build_robot is build.build_core else (grid, (0.0, 0.0, 0.0))
+    core, taken = build_robot(config, *arguments), []
+
+    def session(*given):
+        taken.append(given[-1])
+        return SimpleNamespace(reopened=lambda: None)
+
+    for module, name in ((lockstep, "Recorded{}Session"), (replay, "{}Session")):
+        monkeypatch.setattr(module, name.format("Kobuki"), session)
+        monkeypatch.setattr(module, name.format("Hokuyo"), session)
+    monkeypatch.setattr(lockstep, "Wire", lambda *_: None)
+    with suppress(AttributeError):
+        lockstep.run_lockstep(SimpleNamespace(kobuki=None, hokuyo=None), core, None, 0.0)
+    replay.replay_map(SimpleNamespace(entries=lambda: iter(())), core, as_then=False)
+    assert taken == [config.devices.kobuki, config.devices.hokuyo] * 2
+    core.close()

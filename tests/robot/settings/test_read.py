@@ -86,6 +86,18 @@ BAD = {
         "[safety]\ncycle_age_s = 0.15\n[nav]\nperiod_s = 0.15\n",
         "4: nav.period_s: 0.15 must be below safety.cycle_age_s (0.15)",
     ),
+    "an empty battery that is not low": (
+        "[devices.kobuki.battery]\nlow_v = 13.0\n",
+        "2: devices.kobuki.battery.low_v: critical_v = 13.2 must be below low_v = 13",
+    ),
+    "a view the wrong way round": (
+        "[devices.hokuyo.view]\nangle_min_rad = 1\nangle_max_rad = -1.0",
+        "1: devices.hokuyo.view: angle_min 1.0 rad must lie below angle_max -1.0 rad",
+    ),
+    "a fact of the device": (
+        "[devices.kobuki.clock]\nbits = 12\n",
+        "2: devices.kobuki.clock.bits: unknown key",
+    ),
     "twice": ("[slam]\nparticles = 5\nparticles = 6\n", "3: not TOML: "),
     "no value": ("[laser]\nx_m =\n", "2: not TOML: "),
     "not closed": ("[laser\n", "1: not TOML: "),
