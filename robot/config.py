@@ -17,11 +17,11 @@ from lemtomap.drivers.kobuki.session import KobukiConfig
 from lemtomap.errors import BadSetting
 from lemtomap.grid.config import SlamConfig
 from lemtomap.nav.config import ExploreConfig, NavConfig
-from lemtomap.nav.motion.collision import SKIN_M
 from lemtomap.odometry import OdometryConfig
 from lemtomap.robot.motion.docking import DockingConfig
 from lemtomap.robot.motion.retreat import ReflexConfig
 from lemtomap.robot.motion.safety import SafetyLimits
+from lemtomap.robot.motion.teleop import TeleopConfig
 from lemtomap.robot.motion.velocity import SmootherConfig
 from lemtomap.robot.output.viewer_config import ViewerConfig
 from lemtomap.se2 import Pose, pose
@@ -124,6 +124,7 @@ class RobotConfig:
     loops: LoopConfig = field(default_factory=LoopConfig)
     docking: DockingConfig = field(default_factory=DockingConfig)
     retreat: ReflexConfig = field(default_factory=ReflexConfig)
+    teleop: TeleopConfig = field(default_factory=TeleopConfig)
     prune: PruneConfig = field(default_factory=PruneConfig)
     viewer: ViewerConfig = field(default_factory=ViewerConfig)
     amcl: AmclConfig = field(default_factory=AmclConfig)
@@ -184,9 +185,12 @@ def _relations(config: RobotConfig) -> Iterator[_Relation]:
         f"{away_m:g} m from the middle is outside the body (radius {radius_m:g} m)",
         (("laser", "x_m"), ("laser", "y_m"), body),
     )
-    rule = f"must be below the {SKIN_M:g} m that navigation keeps, or the gate holds what it steers past"
+    margin_m, skin_m = safety.side_margin_m, config.nav.collision.skin_m
+    rule = f"must be below nav.collision.skin_m ({skin_m:g}), or the gate holds what navigation steers past"
     yield _Relation(
-        safety.side_margin_m < SKIN_M, f"{safety.side_margin_m:g} {rule}", (("safety", "side_margin_m"),)
+        margin_m < skin_m,
+        f"{margin_m:g} {rule}",
+        (("safety", "side_margin_m"), ("nav", "collision", "skin_m")),
     )
     yield _Relation(
         safety.own_parts_m < radius_m,

@@ -80,7 +80,8 @@ def _hands(options: RobotOptions, runtime: Runtime) -> AbstractContextManager[No
     def change_level(level: int) -> None:
         core.exchange.nav_events.put(LevelChanged(level))
 
-    return driven_by_hand(KeyListener(core.base.teleop, change_level, runtime.stop.set), runtime.clock.now_s)
+    listener = KeyListener(core.base.teleop, change_level, runtime.stop.set)
+    return driven_by_hand(listener, runtime.clock.now_s, options.config.teleop)
 
 
 def find_ports(config: PortsConfig) -> PortsConfig:

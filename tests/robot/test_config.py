@@ -178,7 +178,10 @@ def test_exploration_is_set_in_its_own_table(tmp_path):
         ("[body]\nradius_m = 0.45\n", "half a door"),
         ("[laser]\nx_m = 0.15\ny_m = 0.15\n", "laser.x_m: 0.212132 m from the middle is outside the body"),
         ("[laser]\nroll_deg = 90\n", "roll_deg = 90: must be 0 or 180"),
-        ("[safety]\nside_margin_m = 0.02\n", "safety.side_margin_m: 0.02 must be below the 0.015 m"),
+        (
+            "[safety]\nside_margin_m = 0.02\n",
+            "safety.side_margin_m: 0.02 must be below nav.collision.skin_m",
+        ),
         ("[safety]\nv_max = 1\n", "is safety.v_max_mps meant?"),
         ("[saftey]\nv_max_mps = 1\n", "is safety meant?"),
     ],

@@ -93,6 +93,9 @@ def stages(config, tmp_path_factory):
     onlooker = SimpleNamespace(raw=SimpleNamespace(put=None))
     runtime = Runtime(core, Ports(None, None), onlooker)
     taken += [runtime._kobuki, runtime._hokuyo]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(real, "driven_by_hand", lambda *arguments: taken.append(arguments[-1]))
+        real._hands(real.RobotOptions("idle", 0.0, config, by_hand=True), runtime)
     return taken
 
 

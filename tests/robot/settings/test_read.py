@@ -80,7 +80,7 @@ BAD = {
     "a laser aslant": ("[laser]\nroll_deg = 90\n", "2: laser.roll_deg: roll_deg = 90: must be 0 or 180"),
     "a gate too wide": (
         "[safety]\nside_margin_m = 0.015\n",
-        "2: safety.side_margin_m: 0.015 must be below the 0.015 m that navigation keeps",
+        "2: safety.side_margin_m: 0.015 must be below nav.collision.skin_m (0.015), or",
     ),
     "a slow cycle": (
         "[safety]\ncycle_age_s = 0.15\n[nav]\nperiod_s = 0.15\n",
