@@ -15,6 +15,7 @@ class ViewerConfig:
     plot_hz: float = 5.0
     timing_hz: float = 2.0
     part_hz: float = 0.2  # how often the file's size is looked at
+    preview_s: float = 15.0  # between two pictures of the map in the run's folder
     flush_s: float = 2.0  # of wall time between two writes, unless somebody watches: each costs 1 kB a path
     close_s: float = 3.0  # for the last bytes to reach the file
     body_m: float = 0.18  # radius of the robot as drawn

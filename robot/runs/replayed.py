@@ -11,6 +11,7 @@ from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.devices.recorded import Recording
 from lemtomap.robot.devices.replay import replay_map
 from lemtomap.robot.exchange import Ended, MissionState
+from lemtomap.robot.output.onlooker import LOOK_PERIOD_S
 from lemtomap.robot.output.progress import Bar
 from lemtomap.robot.runs.run import (
     Run,
@@ -21,7 +22,6 @@ from lemtomap.robot.runs.run import (
 from lemtomap.robot.settings.check import from_mapping
 from lemtomap.robot.settings.read import read_settings
 
-LOOK_PERIOD_S = 0.1
 UNTOLD = "the recording does not tell the run's settings"
 
 

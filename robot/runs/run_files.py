@@ -27,7 +27,6 @@ from lemtomap.robot.runs.folder import RunFolder, Space
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, MapView
 
-PREVIEW_PERIOD_S = 15.0
 WALLS_PERIOD_S = 0.5  # of the scans that draw the walls in the picture
 FOLDER_PERIOD_S = 1.0  # of wall time between two looks at the folder and its disk
 RECORDINGS = ("run.rrd", "run.mcap")
@@ -86,7 +85,8 @@ class RunFiles(Onlooker):
         self._title, self._core, self._listener = record.title, core, listener
         self._begun = _Clock()
         self._walls = WallSketch()
-        self._walls_due_s, self._preview_due_s, self._folder_due_s = 0.0, PREVIEW_PERIOD_S, 0.0
+        self._preview_s = record.viewer.preview_s
+        self._walls_due_s, self._preview_due_s, self._folder_due_s = 0.0, record.viewer.preview_s, 0.0
         self._truth: Callable[[], Pose | None] | None = None
         self._scarce = ""
         self._space_lock = threading.Lock()
@@ -117,7 +117,7 @@ class RunFiles(Onlooker):
         if view is not None and true is not None and self._viewer is not None:
             self._view.show_truth(now_s, true, view.T_grid_base)
         if view is not None and now_s >= self._preview_due_s:
-            self._preview_due_s = now_s + PREVIEW_PERIOD_S
+            self._preview_due_s = now_s + self._preview_s
             self._preview(view)
         if scan is not None and now_s >= self._walls_due_s:
             self._walls_due_s = now_s + WALLS_PERIOD_S

@@ -36,11 +36,10 @@ from lemtomap.robot.devices.recording import (
 from lemtomap.robot.devices.wire import RecordedHokuyoSession, RecordedKobukiSession
 from lemtomap.robot.exchange import Ended, MissionState, NoteLevel
 from lemtomap.robot.missions.missions import Mission
-from lemtomap.robot.output.onlooker import Onlooker
+from lemtomap.robot.output.onlooker import LOOK_PERIOD_S, Onlooker
 from lemtomap.robot.runs.interrupts import on_interrupt
 
 OUTPUT_PERIOD_S = 0.02  # design, section 4
-LOOK_PERIOD_S = 0.1
 SETTLE_S = 1.0  # after a mission: the last scans, a standing robot
 JOIN_S = 5.0
 SWITCH_S = (

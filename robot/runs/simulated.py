@@ -14,6 +14,7 @@ from lemtomap.robot.devices.parts import DEFAULT_LIMIT
 from lemtomap.robot.missions.missions import parse_mission
 from lemtomap.robot.missions.places import mission_from
 from lemtomap.robot.output.display import has_display
+from lemtomap.robot.output.onlooker import LOOK_PERIOD_S
 from lemtomap.robot.output.progress import Bar, first_use
 from lemtomap.robot.runs.lockstep import run_lockstep
 from lemtomap.robot.runs.run import (
@@ -29,8 +30,6 @@ from lemtomap.sim import worlds
 from lemtomap.sim.picture import outlines
 from lemtomap.sim.simulator import Simulator
 from lemtomap.topo.file.store import TopoStore
-
-LOOK_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,8 @@ from lemtomap.se2 import Pose
 from lemtomap.topo.events import EdgeBlocked, EdgeTraversed, NavEvent
 from lemtomap.types import MapView, RouteGraph, Twist
 
-NEAR_BARRIER_M = 1.0
-SEEN_FREE_TIMES = 2
+NEAR_BARRIER_M = 1.0  # the robot stands before what closes its edge
+SEEN_FREE_TIMES = 2  # an edge closed more often than that waits for its time: sight misleads there
 STARTS_TRIED = 12
 BESIDE_M = 8.0
 """Nodes this near may stand in for the associated one."""
