@@ -101,7 +101,7 @@ def test_a_section_is_shown_with_those_within_it_and_no_other(told):
 
 def test_a_section_that_is_none_is_refused_with_those_there_are(refused):
     said = refused("--section", "motor")
-    assert "--section motor: no such section; there are body, ports, laser" in said
+    assert "--section motor: no such section; there are body, ports, devices, laser" in said
     assert "--section" in refused("--section", "nav.body.v_max_mps")
 
 
