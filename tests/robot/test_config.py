@@ -208,3 +208,11 @@ def test_a_laser_upside_down_sees_the_same_room():
     hanging = bridge.scan_of(seen, np.zeros(3), upside_down=True)
     angles = upright.angle_min_rad + upright.angle_step_rad * np.arange(3)
     assert np.allclose(hanging.angle_min_rad + hanging.angle_step_rad * np.arange(3), -angles)
+
+
+def test_a_laser_at_either_half_turn_hangs_upside_down():
+    assert [config.LaserConfig(roll_deg=roll).is_upside_down for roll in (0.0, 180.0, -180.0)] == [
+        False,
+        True,
+        True,
+    ]

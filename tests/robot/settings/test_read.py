@@ -98,6 +98,14 @@ BAD = {
         "[devices.kobuki.clock]\nbits = 12\n",
         "2: devices.kobuki.clock.bits: unknown key",
     ),
+    "parts outside the body": (
+        "[safety]\nown_parts_m = 0.17\n[body]\nradius_m = 0.178\n[laser]\nx_m = 0.2\n",
+        "6: laser.x_m: 0.2 m from the middle is outside the body (radius 0.178 m)",
+    ),
+    "scans left out": (
+        "[devices.hokuyo.view]\nskip = 10\n",
+        "2: devices.hokuyo.view.skip: 10 must lie between 0 and 9",
+    ),
     "twice": ("[slam]\nparticles = 5\nparticles = 6\n", "3: not TOML: "),
     "no value": ("[laser]\nx_m =\n", "2: not TOML: "),
     "not closed": ("[laser\n", "1: not TOML: "),
