@@ -192,11 +192,6 @@ def _relations(config: RobotConfig) -> Iterator[_Relation]:
         f"{margin_m:g} {rule}",
         (("safety", "side_margin_m"), ("nav", "collision", "skin_m")),
     )
-    yield _Relation(
-        safety.own_parts_m < radius_m,
-        f"{safety.own_parts_m:g} must be below body.radius_m ({radius_m:g})",
-        (("safety", "own_parts_m"), body),
-    )
     rule = f"must be below safety.cycle_age_s ({safety.cycle_age_s:g}), or the gate stops between two cycles"
     yield _Relation(
         period_s < safety.cycle_age_s,
