@@ -31,7 +31,14 @@ class BadSample(BadInput):
 
 
 class BadSetting(BadInput):
-    """A setting cannot work; the text names it and its limits."""
+    """A setting cannot work; the text names it and its limits.
+
+    names: the fields it is about, where they are known; any of them may be the one to change.
+    """
+
+    def __init__(self, text: str, *names: str) -> None:
+        super().__init__(text)
+        self.names = names
 
 
 class NoRoute(LemtomapError):

@@ -41,10 +41,6 @@ from lemtomap.nav.types import (
 from lemtomap.se2 import Pose
 from lemtomap.types import MapView, RouteGraph, Twist
 
-BUMP_BACK_M = 0.15
-AT_NODE_M = 0.5
-BY_NODE_M = 1.2
-STAYED_M = 0.4
 REST = Twist(0.0, 0.0)
 
 
@@ -82,7 +78,7 @@ class Navigator:
         A robot that has hardly moved since the last goal keeps its count of failed recoveries: whoever moves
         the goal about while it is stuck does not keep it from giving up.
         """
-        stayed = self._goal is not None and self._way_back.stayed_m < STAYED_M
+        stayed = self._goal is not None and self._way_back.stayed_m < self.config.recovery.stayed_m
         self._goal = Goal(goal) if isinstance(goal, int) else goal
         self._way.route = None
         self.lookout.restart()
@@ -148,7 +144,7 @@ class Navigator:
         for contact in bumps:
             moment.events.append(self.surroundings.touch(contact, moment.map_view, moment.T_grid_base))
         if bumps and self._goal is not None:
-            self._ladder.back_off(moment.T_odom_base, moment.now_s, BUMP_BACK_M)
+            self._ladder.back_off(moment.T_odom_base, moment.now_s, self.config.recovery.bump_back_m)
             self.lookout.forget()
 
     # ---- one cycle with a goal ----
@@ -243,8 +239,8 @@ class Navigator:
             return False
         away_m = float(np.hypot(*(place - moment.T_grid_base)[:2]))
         if not target.final:
-            return away_m < AT_NODE_M
-        return away_m < BY_NODE_M and is_roundabout(route, goal, target, plan.length_m)
+            return away_m < self.config.follow.at_node_m
+        return away_m < self.config.follow.by_node_m and is_roundabout(route, goal, target, plan.length_m)
 
     # ---- driving ----
 
@@ -267,7 +263,7 @@ class Navigator:
         self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: CycleInput
     ) -> NavOutput:
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
-        twist = limit_twist(step.twist, points, self.config.body)
+        twist = limit_twist(step.twist, points, self.config.body, self.config.collision)
         state = NavState.TURNING if step.motion == FollowerState.TURN else NavState.DRIVING
         reason = (
             NavReason.OBSTACLE
@@ -340,7 +336,7 @@ class Navigator:
         if wanted.v_mps < 0.0:
             twist = replace(twist, v_mps=min(twist.v_mps, 0.0))  # no braking distance into what was touched
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
-        twist = limit_twist(twist, points, self.config.body)
+        twist = limit_twist(twist, points, self.config.body, self.config.collision)
         return self._output(moment, twist, NavState.RECOVERING, NavReason.OBSTACLE, name)
 
     def _room_behind(self, moment: CycleInput) -> bool:

@@ -24,7 +24,7 @@ from lemtomap.se2 import Pose
 from lemtomap.topo.events import EdgeTraversed, NavEvent
 from lemtomap.types import MapView, RouteGraph, Twist
 
-NEAR_BARRIER_M = 1.0
+NEAR_BARRIER_M = 1.0  # the robot stands before what closes its edge
 STARTS_TRIED = 12
 BESIDE_M = 8.0
 """Nodes this near may stand in for the associated one."""
