@@ -7,12 +7,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap import se2
-from lemtomap.errors import NoRoute
+from lemtomap.errors import NoRoute, NotStarted
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
@@ -25,6 +27,7 @@ from lemtomap.nav.motion.recovery import (
     RecoverySequence,
 )
 from lemtomap.nav.outlook import FarLook, Lookout, WindowLook
+from lemtomap.nav.places import goal_at
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.sliding import Target, is_roundabout, place_of
 from lemtomap.nav.route.watching import EdgeClock
@@ -38,14 +41,24 @@ from lemtomap.nav.types import (
     NavState,
     ObstacleSighting,
 )
+from lemtomap.samples import as_finite, as_points, check_kind
 from lemtomap.se2 import Pose
-from lemtomap.types import MapView, RouteGraph, Twist
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.types import MapView, Odometry, RouteGraph, Scan, Twist
 
 REST = Twist(0.0, 0.0)
 
 
 class Navigator:
-    """Drives to goals, one at a time; a new goal replaces the old one without a stop."""
+    """Drives to goals, one at a time; a new goal replaces the old one without a stop.
+
+        with lemtomap.Navigator.open("my.lemto") as navigator:
+            navigator.go_to("kitchen")
+            twist = navigator.drive(mapper.view(), odometry, scan).twist
+
+    `open`, `go_to` and `drive` are for programs that map and drive in turn; a robot with a thread for each
+    gives `set_goal` and `step` what it has.
+    """
 
     def __init__(
         self, config: NavConfig | None = None, far: Callable[[Surroundings], FarLook] = WindowLook
@@ -66,6 +79,79 @@ class Navigator:
         self._ladder = RecoverySequence(self.config.recovery)
         self._way_back = BreadcrumbTrail()
         self._edge_clock = EdgeClock()
+        self._map: TopoReader | None = None
+        """The file that `open` was given."""
+        self._asked: Goal | None = None
+        """Goes to `set_goal` with the next `drive`, which knows the time."""
+
+    @classmethod
+    def open(cls, path: Path | str, *, config: NavConfig | None = None) -> Self:
+        """Navigate by a map file, which a Mapper may be writing. Raises BadMap, and BadSample for arguments
+        that are none.
+        """
+        check_kind("Navigator.open: path", path, str, Path)
+        check_kind("Navigator.open: config", config, NavConfig, type(None))
+        navigator = cls(config)
+        navigator._map = TopoReader(path)
+        return navigator
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the map file that `open` opened."""
+        if self._map is not None:
+            self._map.close()
+
+    def go_to(self, place: Goal | int | str) -> None:
+        """Drive from now on to a node, by number or name, or to a point in a node's frame.
+
+        A Mapper writes what is new twice a second; a node is a place to go to from then on.
+        Raises NoRoute when the map has no such place, BadSample for what is none, NotStarted without `open`.
+        """
+        self._asked = goal_at(place, self._opened())
+
+    def drive(
+        self,
+        view: MapView,
+        odometry: Odometry,
+        seen: Scan | NDArray[np.floating] | Sequence[Sequence[float]] | None = None,
+        bumps: Sequence[Contact] = (),
+    ) -> NavOutput:
+        """Run one control cycle, best ten times a second: `.twist` is what the base should do now.
+
+        `.state`, `.reason` and `.text` say how it goes; `.events` is for the next `Mapper.update`.
+        odometry: the base now; its stamp is the time. seen: a new scan taken there, or points float (N, 2),
+        metres, base frame; None: nothing new. bumps: contacts since the last call. Raises BadSample for
+        arguments that are none, NotStarted without `open`.
+        """
+        graph = self._opened()
+        check_kind("Navigator.drive: view", view, MapView)
+        check_kind("Navigator.drive: odometry", odometry, Odometry)
+        T_odom_base, now_s = as_finite("Odometry.T_odom_base", odometry.T_odom_base), odometry.stamp_s
+        sighting = (
+            ObstacleSighting.from_scan(seen, T_odom_base)
+            if isinstance(seen, Scan)
+            else None
+            if seen is None
+            else as_points("Navigator.drive: seen", seen)
+        )
+        for contact in bumps:
+            check_kind("Navigator.drive: bumps", contact, Contact)
+        if self._asked is not None:
+            self.set_goal(self._asked, now_s)
+            self._asked = None
+        _ = graph.version  # asked once a cycle: here the reader forgets what has changed
+        twist = Twist(odometry.v_mps, odometry.w_radps)
+        return self.step(view, graph, T_odom_base, twist, sighting, bumps, now_s)
+
+    def _opened(self) -> TopoReader:
+        if self._map is None:
+            raise NotStarted("this navigator has no map file: make it with Navigator.open")
+        return self._map
 
     @property
     def goal(self) -> Goal | None:
