@@ -161,6 +161,9 @@ class LoopConfig:
     corridor_weight: float = 0.67  # ... only this much: three are needed, over twice the way
     corridor_sigma_m: float = 0.3  # ... and it may be off so much along it (seen: up to 0.55 m)
     expected_m: float = 1.0  # a place this near to where the graph knows it to be needs not be unique, ...
+    expected_sigma_m: float = (
+        2.0  # ... if the graph knows it to this, one sigma (like halls are further apart)
+    )
     expected_rad: float = 0.2  # ... if it turns as expected, ...
     expected_step_m: float = 0.25  # ... of poses along its wall so far apart (alignment reaches 0.3 m) ...
     expected_slack: float = 0.01  # ... and it is the nearest that explains as much as the best, to this share

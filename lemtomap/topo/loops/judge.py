@@ -51,13 +51,13 @@ class Judge:
         """Return a place where the graph expects it, if it fits there as well as anywhere, else None.
 
         Along one wall a search finds a place anywhere, and none of these poses is unique. But where the
-        graph knows the place to within `expected_m`, one needs no proof: that nearest to where it should be.
+        graph knows the place, one needs no proof: that nearest to where it should be.
         The wall says how far it is away and how it turns; the graph says what the wall does not.
         """
         config, here, company = self.config, task.situation, self.company(task)
         if company is None or here.here_id not in here.measured or task.way_m < config.gate.least_way_m:
             return None
-        if not task.box.is_known_within(config.expected_m):
+        if not task.box.is_known_within(config.expected_sigma_m):
             return None
         fits = [
             task.reference.refine(company.points_node, seed) for seed in self._along_wall(match, task.box)
@@ -90,7 +90,7 @@ class Judge:
         """Tell whether a place stands where the graph knows it to be: like door frames are further apart."""
         off_rad = abs(float(wrap_angle(match.T_grid_place[2] - box.expected[2])))
         near = box.off_m(match.T_grid_place) <= self.config.expected_m and off_rad <= self.config.expected_rad
-        return near and box.is_known_within(self.config.expected_m)
+        return near and box.is_known_within(self.config.expected_sigma_m)
 
     def is_alias(self, match: SearchMatch, task: Task) -> bool:
         """Tell whether a place found elsewhere than the graph has it only resembles what is known there.
