@@ -126,7 +126,7 @@ class Judge:
             reversed_covariance(here.T_grid_here, here.covariance), match.T_grid_place, match.covariance
         )
         if match.weakest < self.config.corridor:
-            covariance = covariance + self._along(match, task.box)
+            covariance = covariance + self._along(match)
         informs = here.here_id in here.measured and here.here_id != task.node_id
         return Sighting(
             task.node_id,
@@ -139,17 +139,11 @@ class Judge:
             self._evidence(task, match),
         )
 
-    def _along(self, match: SearchMatch, box: SearchBox) -> Covariance:
-        """Return what a match in a corridor is unsure of along it, beyond its own figures.
-
-        Too little to be told apart from another pose, it says nothing there that the graph did not know.
-        """
+    def _along(self, match: SearchMatch) -> Covariance:
+        """Return what a match in a corridor is unsure of along it, beyond its own figures."""
         along = np.zeros(3)
         along[:2] = np.linalg.eigh(match.covariance[:2, :2])[1][:, -1]
-        sigma_m = self.config.corridor_sigma_m
-        if match.weakest < self.config.weakest and box.sigma is not None:
-            sigma_m = max(sigma_m, float(np.hypot(*(box.sigma[:2] * _weak_axis(match)))))
-        return np.asarray(sigma_m**2 * np.outer(along, along))
+        return np.asarray(self.config.corridor_sigma_m**2 * np.outer(along, along))
 
     def _evidence(self, task: Task, match: SearchMatch) -> float:
         """Return how much a sighting counts: less for each reason to think that it may be chance.
