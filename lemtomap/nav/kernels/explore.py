@@ -126,6 +126,27 @@ def worst_between(state: U1, row0: float, col0: float, row1: float, col1: float)
 
 
 @njit(nogil=True, cache=True)
+def fits_between(
+    cost: F4, state: U1, row0: float, col0: float, row1: float, col1: float, ends: float
+) -> bool:
+    """Return True if the body fits all along a straight line over known floor.
+
+    Within `ends` (cells) of either end the floor need only be known: both may stand close to a wall.
+    """
+    height, width = state.shape
+    length = max(abs(row1 - row0), abs(col1 - col0))
+    steps = int(2.0 * length) + 1
+    for k in range(steps + 1):
+        r, c = int(row0 + (row1 - row0) * k / steps), int(col0 + (col1 - col0) * k / steps)
+        if r < 0 or c < 0 or r >= height or c >= width or state[r, c] != FREE:
+            return False
+        from_end = length * min(k, steps - k) / steps
+        if from_end > ends and not np.isfinite(cost[r, c]):
+            return False
+    return True
+
+
+@njit(nogil=True, cache=True)
 def dark_in_sight(state: U1, large: U1, row: float, col: float, radius: float) -> bool:
     """Return True if a large unseen patch lies within radius (cells) of a place, not behind an obstacle.
 
