@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lemtomap.kernels.lines import first_on_line
 from lemtomap.nav.kernels import explore as kernels
 from lemtomap.nav.motion.metric import Reach
 from lemtomap.se2 import Pose
@@ -63,7 +64,7 @@ class Ground:
 
     def walled_off(self, p_grid: ArrayLike, q_grid: ArrayLike) -> bool:
         """Return True if an obstacle stands between two places."""
-        return self._worst(p_grid, q_grid) == kernels.LETHAL
+        return self._holds_on_line(p_grid, q_grid, kernels.LETHAL)
 
     def node_in_sight(self, p_grid: ArrayLike, T_grid_node: Mapping[int, Pose], otherwise_id: int) -> int:
         """Return the nearest node from which a place is seen over known floor, else the one given.
@@ -73,10 +74,12 @@ class Ground:
         p = np.asarray(p_grid, dtype=np.float64)[:2]
         away = {node_id: float(np.hypot(*(T[:2] - p))) for node_id, T in T_grid_node.items()}
         for node_id in sorted(away, key=lambda n: away[n]):
-            if self._worst(p, T_grid_node[node_id]) == kernels.FREE:
+            if not self._holds_on_line(p, T_grid_node[node_id], kernels.UNKNOWN):
                 return node_id
         return otherwise_id if otherwise_id in away else min(away, key=lambda n: away[n])
 
-    def _worst(self, p_grid: ArrayLike, q_grid: ArrayLike) -> int:
+    def _holds_on_line(self, p_grid: ArrayLike, q_grid: ArrayLike, least: int) -> bool:
+        """Return True if a state that bad lies between two places; beyond the window all is unknown."""
         costs = self.reach.costs
-        return int(kernels.worst_between(costs.state, *costs.cell(p_grid), *costs.cell(q_grid)))
+        line = (*costs.cell(p_grid), *costs.cell(q_grid))
+        return bool(np.isfinite(first_on_line(costs.state, *line, least, kernels.UNKNOWN)))
