@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lemtomap.kernels.lines import first_on_line
 from lemtomap.nav.kernels import explore as kernels
 from lemtomap.nav.kernels import fields
 from lemtomap.nav.motion.metric import Reach, top_cost
@@ -64,7 +65,7 @@ class Ground:
 
     def walled_off(self, p_grid: ArrayLike, q_grid: ArrayLike) -> bool:
         """Return True if an obstacle stands between two places."""
-        return self._worst(p_grid, q_grid) == kernels.LETHAL
+        return self._holds_on_line(p_grid, q_grid, kernels.LETHAL)
 
     def node_in_sight(self, p_grid: ArrayLike, T_grid_node: Mapping[int, Pose], otherwise_id: int) -> int:
         """Return the nearest node from which the robot gets straight to a place over known floor.
@@ -95,6 +96,8 @@ class Ground:
         ways = {node_id: float(field[cell[0], cell[1]]) for node_id, cell in cells.items() if cell}
         return {node_id: way for node_id, way in ways.items() if np.isfinite(way)}
 
-    def _worst(self, p_grid: ArrayLike, q_grid: ArrayLike) -> int:
+    def _holds_on_line(self, p_grid: ArrayLike, q_grid: ArrayLike, least: int) -> bool:
+        """Return True if a state that bad lies between two places; beyond the window all is unknown."""
         costs = self.reach.costs
-        return int(kernels.worst_between(costs.state, *costs.cell(p_grid), *costs.cell(q_grid)))
+        line = (*costs.cell(p_grid), *costs.cell(q_grid))
+        return bool(np.isfinite(first_on_line(costs.state, *line, least, kernels.UNKNOWN)))

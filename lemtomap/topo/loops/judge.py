@@ -87,7 +87,7 @@ class Judge:
         return [np.array([*(middle + step_m * along), match.T_grid_place[2]]) for step_m in steps_m]
 
     def _is_expected(self, match: SearchMatch, box: SearchBox) -> bool:
-        """Return True if a place stands where the graph knows it to be: like door frames are further apart."""
+        """Return True if a place is where the graph knows it to be: like door frames are further apart."""
         off_rad = abs(float(wrap_angle(match.T_grid_place[2] - box.expected[2])))
         near = box.off_m(match.T_grid_place) <= self.config.expected_m and off_rad <= self.config.expected_rad
         return near and box.is_known_within(self.config.expected_sigma_m)
