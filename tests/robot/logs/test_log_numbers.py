@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from lemtomap.robot.logs.kernels.decimals import decimals
@@ -28,6 +28,7 @@ def python_reads(text):
 
 
 @settings(deadline=None)  # the first line may have to wait for a compiler
+@example([f"{value:.17f}" for value in np.random.default_rng(0).random(200)], " ")
 @given(st.lists(WRITTEN, max_size=8), BLANKS)
 def test_every_field_is_the_number_that_python_reads_to_the_last_bit(texts, blank):
     fields = Fields(blank.join(texts) + blank)
