@@ -1,0 +1,1 @@
+"""Flat loops over plain arrays that more than one layer needs."""
