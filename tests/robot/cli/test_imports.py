@@ -14,7 +14,7 @@ TOLD = "import json, sys; print(json.dumps(sorted(sys.modules)))"
 
 
 def modules_after(code, *arguments):
-    told = subprocess.run(
+    told = subprocess.run(  # noqa: S603
         [sys.executable, "-c", f"import sys; sys.path.append({str(ROOT)!r})\n{code}\n{TOLD}", *arguments],
         check=True,
         capture_output=True,
@@ -38,9 +38,8 @@ def test_help_imports_nothing_heavy(arguments):
 
 def test_mapping_a_log_imports_no_viewer_no_plotter_and_no_simulator(tmp_path):
     readings = " ".join(f"{r:.2f}" for r in 3.0 + np.sin(np.arange(180) / 9.0))
-    lines = [
-        f"FLASER 180 {readings} {x:.2f} 0 0 {x:.2f} 0 0 {x:.2f} host {x:.2f}" for x in np.arange(0.0, 3.0, 0.1)
-    ]
+    way_m = np.arange(0.0, 3.0, 0.1)
+    lines = [f"FLASER 180 {readings} {x:.2f} 0 0 {x:.2f} 0 0 {x:.2f} host {x:.2f}" for x in way_m]
     (tmp_path / "a.clf").write_text("\n".join(lines) + "\n")
     modules = modules_after(command("map", str(tmp_path / "a.clf"), "--out", str(tmp_path / "out")))
     assert (tmp_path / "out" / "overview.png").read_bytes().startswith(b"\x89PNG")
@@ -49,5 +48,5 @@ def test_mapping_a_log_imports_no_viewer_no_plotter_and_no_simulator(tmp_path):
 
 def test_the_robot_imports_no_plotter_no_simulator_and_no_solver_before_it_drives():
     modules = modules_after("import lemtomap.robot.runs.real")
-    assert heavy(modules) == {"numba", "rerun", "pyarrow", "PIL", "mcap"}  # the viewer, the recorder, the preview
+    assert heavy(modules) == {"numba", "rerun", "pyarrow", "PIL", "mcap"}  # viewer, recorder, preview
     assert not {name for name in modules if name.startswith(("scipy.ndimage", "scipy.spatial"))}
