@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.grid import DEFAULT_SLAM
+from lemtomap.grid.foreground import is_foreground
 from lemtomap.nav.kernels import shapes
 from lemtomap.nav.types import Contact, ContactKind, Goal
 from lemtomap.robot.build import build_core
@@ -63,6 +64,7 @@ def warm_up(config: RobotConfig, slam: str = DEFAULT_SLAM) -> None:
             core.close()
     _tell_rivals_apart()
     shapes.eroded(np.ones((3, 3), np.uint8), 1)  # for nodes out of view, which the imagined robot never has
+    is_foreground(np.zeros((3, 2), np.float32))  # for somebody who walks along
     gc.collect()
     gc.freeze()  # what is loaded now stays: a look through all of it for garbage takes tens of milliseconds
 
