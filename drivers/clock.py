@@ -92,7 +92,7 @@ class DeviceClock:
 
     @property
     def fresh(self) -> bool:
-        """Tell whether the next stamp begins an epoch."""
+        """Return True if the next stamp begins an epoch."""
         return self._raw < 0
 
     def begin(self, first_raw: int, latest_raw: int, arrival_s: float) -> None:

@@ -26,7 +26,7 @@ class Session(Protocol[E]):
 
     @property
     def alive(self) -> bool:
-        """Tell whether the right device answers."""
+        """Return True if the right device answers."""
         ...
 
     def receive(self, data: bytes, now_s: float) -> list[E]:
@@ -98,7 +98,7 @@ class Driver(Generic[E]):
 
     @property
     def is_open(self) -> bool:
-        """Tell whether bytes can be sent."""
+        """Return True if bytes can be sent."""
         return self._port is not None
 
     def write(self, data: bytes) -> bool:

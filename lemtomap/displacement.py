@@ -144,7 +144,7 @@ class Watch:
         return self._leapt(off, telling=telling) or self._misfits(slam, telling=telling)
 
     def _vanished(self, slam: SlamUpdate, seen: _Seen) -> bool:
-        """Tell whether nothing is left of what the scan before showed.
+        """Return True if nothing is left of what the scan before showed.
 
         On ground that the window does not know a scan fits nothing, whether the robot drove there or was put
         there; but who drives still sees a moment later what was in sight before. A scan that was not matched,

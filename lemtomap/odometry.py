@@ -75,7 +75,7 @@ class WheelGyroOdometry:
 
     @property
     def standing(self) -> bool:
-        """Tell whether the base stands still."""
+        """Return True if the base stands still."""
         return self._still_s >= self.config.still_after_s
 
     def update(
@@ -178,7 +178,7 @@ class OdometryBuffer:
         self._first = max(self._first, self._end - self._capacity)
 
     def covers(self, *stamps_s: float) -> bool:
-        """Tell whether all these moments lie between the oldest and the newest pose."""
+        """Return True if all these moments lie between the oldest and the newest pose."""
         return bool(len(self)) and self.oldest_s <= min(stamps_s) and max(stamps_s) <= self.newest_s
 
     @property

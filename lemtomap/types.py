@@ -153,7 +153,7 @@ class RouteGraph(Protocol):
         ...
 
     def has_node(self, node_id: int) -> bool:
-        """Tell whether the map knows this node."""
+        """Return True if the map knows this node."""
         ...
 
     def edges_of(self, node_id: int) -> Sequence[RouteEdge]:

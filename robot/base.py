@@ -263,11 +263,13 @@ class BaseStep:
         """Log each change of the gate's reason that is worth a line."""
         if reason is self._reason:
             return
-        quiet = {Reason.CLEAR, Reason.LIMIT, Reason.NEAR_OBSTACLE, Reason.VELOCITY_SILENT}
+        quiet = {Reason.CLEAR, Reason.LIMIT, Reason.NEAR_OBSTACLE, Reason.COMMAND_TIMEOUT}
         if reason not in quiet:
             self._exchange.note(now_s, "safety", f"stopped: {reason}", NoteLevel.WARN)
         elif self._reason not in quiet:
-            self._exchange.note(now_s, "safety", f"no longer: {self._reason}")
+            over = self._reason
+            text = "permission to move given" if over is Reason.NOT_PERMITTED else f"cleared: {over}"
+            self._exchange.note(now_s, "safety", text)
         self._reason = reason
 
     def _status(self, wish: Wish | None, sent: Allowed, now_s: float) -> BaseStatus:

@@ -78,7 +78,7 @@ class MissionState(StrEnum):
 
     @property
     def over(self) -> bool:
-        """Tell whether nothing more will come."""
+        """Return True if nothing more will come."""
         return self in {MissionState.DONE, MissionState.FAILED}
 
 

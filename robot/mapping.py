@@ -56,7 +56,7 @@ class MappingStep:
         elif self.mapper.topo.known_place:
             text, level = "found again", NoteLevel.INFO
         else:
-            text, level = "nothing here looks like the map: mapping on as a new part of it", NoteLevel.WARN
+            text, level = "relocalisation failed: starting a separate map component", NoteLevel.WARN
         self._exchange.note(view.stamp_s, "mapping", text, level)
 
     def close(self) -> None:

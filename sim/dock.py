@@ -49,7 +49,7 @@ def _visible(dock: Pose2, robot: Pose2, scene: Scene) -> bool:
 
 
 def docked(dock: Pose2, robot: Pose2) -> bool:
-    """Tell whether the charging contacts touch."""
+    """Return True if the charging contacts touch."""
     dx, dy = robot[0] - dock[0], robot[1] - dock[1]
     ahead = dx * math.cos(dock[2]) + dy * math.sin(dock[2])
     off = -dx * math.sin(dock[2]) + dy * math.cos(dock[2])

@@ -62,7 +62,7 @@ class _SwingingDoor:
         return (*door.hinge, door.closed_yaw_rad + self._angle)
 
     def _would_hit(self, robot: Pose2, turn: float) -> bool:
-        """Tell whether the leaf, moving by turn, comes upon the robot."""
+        """Return True if the leaf, moving by turn, comes upon the robot."""
         dx, dy = robot[0] - self._door.hinge[0], robot[1] - self._door.hinge[1]
         distance = math.hypot(dx, dy)
         if distance > self._door.width_m + self.ROBOT_M or distance < 1e-6:

@@ -90,7 +90,7 @@ def outlines(world: World) -> list[NDArray[np.float64]]:
 
 
 def _is_drawn(box: Box) -> bool:
-    """Tell whether a box belongs into a plan: no ceilings; of the floor only ramps."""
+    """Return True if a box belongs into a plan: no ceilings; of the floor only ramps."""
     return box.centre[2] < 1.5 and (box.surface is not Surface.FLOOR or box.pitch_rad != 0.0)
 
 

@@ -124,7 +124,7 @@ class FloorRoutePlanner:
         return np.array([self._raster.point(row, col) for row, col in row_cols])
 
     def _is_as_good(self, cells: NDArray[np.int64], cost: NDArray[np.float64], at: int, to: int) -> bool:
-        """Tell whether the straight line costs no more than the way between two of its cells."""
+        """Return True if the straight line costs no more than the way between two of its cells."""
         line = _between(cells[at], cells[to])
         rows, cols = np.rint(line).astype(np.int64).T
         step_m = float(np.hypot(*(cells[to] - cells[at]))) / (len(line) - 1) * self._step_m

@@ -170,7 +170,7 @@ class Scene:
         return [hit[2] * FLOOR_FAR_M for hit in raw]
 
     def clear(self, start: tuple[float, float, float], end: tuple[float, float, float]) -> bool:
-        """Tell whether nothing stands between two points."""
+        """Return True if nothing stands between two points."""
         hit = pybullet.rayTest(start, end, collisionFilterMask=SOLID_MASK, physicsClientId=self.client)
         return bool(hit[0][0] < 0)
 

@@ -62,7 +62,7 @@ class Room:
     level: int = 0
 
     def contains(self, x: float, y: float) -> bool:
-        """Tell whether a point lies inside (even-odd rule)."""
+        """Return True if a point lies inside (even-odd rule)."""
         inside = False
         for (x0, y0), (x1, y1) in zip(self.outline, self.outline[1:] + self.outline[:1], strict=True):
             if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):

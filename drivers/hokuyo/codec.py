@@ -232,7 +232,7 @@ def _info(command: str, body: bytes, tag: str) -> Info:
 
 
 def _info_sum_right(match: re.Match[bytes]) -> bool:
-    """Tell whether a line's sum is right in any of the readings found in the field: without `;` (all recorded
+    """Return True if the sum is right in any of the readings found in the field: without `;` (all recorded
     sensors), with it, or without the `<-` remark of II (some UTM-30LX firmware).
     """
     text = match[1] + b":" + match[2]

@@ -51,7 +51,7 @@ class SensorInfo:
 
     @property
     def healthy(self) -> bool:
-        """Tell whether the sensor says of itself that it works."""
+        """Return True if the sensor says of itself that it works."""
         return is_healthy(self.state.get("STAT", ""))
 
 
@@ -59,7 +59,7 @@ _HEALTHY = ("sensor works well", "sensor is working normally", "stable 000")
 
 
 def is_healthy(text: str) -> bool:
-    """Tell whether a STAT text is one of those a working sensor gives; an empty one says nothing bad."""
+    """Return True if a STAT text is one of those a working sensor gives; an empty one says nothing bad."""
     return not text or text.lower().startswith(_HEALTHY)
 
 

@@ -65,12 +65,12 @@ def explain_status(status: str) -> str:
 
 
 def is_checking(status: str) -> bool:
-    """Tell whether the sensor paused measuring to check an error (21 to 49)."""
+    """Return True if the sensor paused measuring to check an error (21 to 49)."""
     return status.isdigit() and 21 <= int(status) <= 49
 
 
 def is_trouble(status: str) -> bool:
-    """Tell whether the laser or the motor failed and the stream is over (50 to 97)."""
+    """Return True if the laser or the motor failed and the stream is over (50 to 97)."""
     return status.isdigit() and 50 <= int(status) <= 97
 
 
@@ -168,7 +168,7 @@ class ScanFrame:
 
     @property
     def intact(self) -> bool:
-        """Tell whether every byte of the frame was right."""
+        """Return True if every byte of the frame was right."""
         return self.valid is None
 
 

@@ -64,7 +64,7 @@ class ScanMaker:
         self.period_s = sensor.period_s * (request.skip + 1)
 
     def answers_request(self, frame: ScanFrame) -> bool:
-        """Tell whether the frame is what was asked for."""
+        """Return True if the frame is what was asked for."""
         r = self.request
         asked = (f"M{r.encoding}", r.start, r.end, r.cluster, r.skip)
         return (frame.command[:2], frame.start, frame.end, frame.cluster, frame.interval) == asked

@@ -58,7 +58,7 @@ class Battery:
 
     @property
     def charging(self) -> bool:
-        """Tell whether current flows into the pack."""
+        """Return True if current flows into the pack."""
         return self.charge is Charge.CHARGING
 
 
@@ -78,7 +78,7 @@ class _Held(Generic[_T]):
         self._since_s = 0.0
 
     def update(self, seen: _T, stamp_s: float) -> bool:
-        """Tell whether the value changed."""
+        """Return True if the value changed."""
         if seen != self._candidate:
             self._candidate, self._since_s = seen, stamp_s
         if seen == self.value or stamp_s - self._since_s < self._hold_s:

@@ -69,7 +69,7 @@ class KobukiSample:
 
     @property
     def contact(self) -> bool:
-        """Tell whether anything asks the robot to stop at once."""
+        """Return True if anything asks the robot to stop at once."""
         return bool(self.bumper or self.wheel_drop or self.cliff)
 
 

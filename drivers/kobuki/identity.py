@@ -61,7 +61,7 @@ class BaseIdentity:
 
     @property
     def has_gains(self) -> bool:
-        """Tell whether the firmware is known to have gain commands; an older one never answers."""
+        """Return True if the firmware is known to have gain commands; an older one never answers."""
         return self.firmware is not None and self.firmware >= GAINS_SINCE
 
     def ask_gains_again(self) -> None:

@@ -37,7 +37,7 @@ class GridGraph:
     version = 1
 
     def has_node(self, node_id: int) -> bool:
-        """Tell whether this is the grid."""
+        """Return True if this is the grid."""
         return node_id == GRID_ID
 
     def edges_of(self, node_id: int) -> Sequence[RouteEdge]:  # noqa: ARG002 - no node has any
@@ -114,6 +114,6 @@ class WholeGridLook:
 
 
 def _stands(costs: Costs, T_grid_base: Pose) -> bool:
-    """Tell whether the robot's cell is one the body fits into."""
+    """Return True if the robot's cell is one the body fits into."""
     row, col = costs.cell(T_grid_base)
     return costs.holds(T_grid_base) and bool(np.isfinite(costs.cost[int(row), int(col)]))

@@ -2,7 +2,7 @@
 
 In a bare corridor one such thing alone tells how far along the robot is, and a person who walks ahead at its
 own pace says with a hundred beams that the robot stands. When a match contradicts the wheels, such things are
-not heard.
+ignored.
 """
 
 from dataclasses import replace

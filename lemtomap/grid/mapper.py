@@ -221,7 +221,7 @@ class Tracker(ABC):
         return match
 
     def _contradicts_wheels(self, match: ScanMatch, predicted: Pose) -> bool:
-        """Tell whether a match takes back, or doubles, a good part of the way the wheels have gone."""
+        """Return True if a match takes back, or doubles, a good part of the way the wheels have gone."""
         way_m = math.hypot(self._pending[0], self._pending[1])
         return match.accepted and _off_m(match, predicted) > self.config.doubted_share * way_m > 0.0
 

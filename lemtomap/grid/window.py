@@ -111,7 +111,7 @@ class Window:
             getattr(self.arrays, name)[...] = getattr(other.arrays, name)
 
     def holds(self, beams: Beams, T_grid_base: Pose) -> bool:
-        """Tell whether every hit falls inside and the robot is not far from the middle.
+        """Return True if every hit falls inside and the robot is not far from the middle.
 
         Beams that saw nothing may reach beyond: what they prove is worth less than what a shift would forget.
         """

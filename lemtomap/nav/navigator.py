@@ -222,7 +222,7 @@ class Navigator:
         return self._output(moment, twist, NavState.WAITING, NavReason.OBSTACLE, f"{text}: waiting")
 
     def _goal_is_shut(self, route: Route, moment: CycleInput) -> bool:
-        """Tell whether the robot has been at the goal's node for a while with no way to the goal itself."""
+        """Return True if the robot has been at the goal's node for a while with no way to the goal itself."""
         if not self._is_beside_goal(route, moment):
             self._shut_since_s = None
         elif self._shut_since_s is None:
@@ -231,7 +231,7 @@ class Navigator:
         return since_s is not None and moment.now_s - since_s > self.config.recovery.closed_after_s
 
     def _is_beside_goal(self, route: Route, moment: CycleInput) -> bool:
-        """Tell whether the robot is at the goal's node and the goal, though near, is not to be reached.
+        """Return True if the robot is at the goal's node and the goal, though near, is not to be reached.
 
         A long way round over unseen floor to a place beside the node is none: it leads through gaps in walls.
         """
@@ -344,7 +344,7 @@ class Navigator:
         return self._output(moment, twist, NavState.RECOVERING, NavReason.OBSTACLE, name)
 
     def _room_behind(self, moment: CycleInput) -> bool:
-        """Tell whether the costmap leaves room 10 cm behind the robot."""
+        """Return True if the costmap leaves room 10 cm behind the robot."""
         costs = self.lookout.costs
         if costs is None:
             return True

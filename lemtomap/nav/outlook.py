@@ -209,7 +209,7 @@ def look_near(surroundings: Surroundings, outlook: ReachableArea, moment: CycleI
 def outdated(
     outlook: ReachableArea, near: MetricPlan | None, route: Route, moment: CycleInput, config: NavConfig
 ) -> bool:
-    """Tell whether it is time for another far look."""
+    """Return True if it is time for another far look."""
     age_s = moment.now_s - outlook.stamp_s
     if age_s < config.plan_period_s - 1e-6:
         return False

@@ -156,7 +156,7 @@ class PlaceKeeper:
 
 
 def _is_free(points_grid: Points, grid: GridView, free_below: int) -> NDArray[np.bool_]:
-    """Tell which points, float64 (N, 2), the window has seen to be free, bool (N,)."""
+    """Return which points, float64 (N, 2), the window has seen to be free, bool (N,)."""
     cells = np.floor((points_grid - np.array(grid.origin_m)) / grid.resolution_m).astype(np.int64)
     rows, cols = grid.occupancy.shape
     inside = (cells >= 0).all(axis=1) & (cells[:, 0] < cols) & (cells[:, 1] < rows)

@@ -44,7 +44,7 @@ class NodePoseEstimate:
     """What the window alone says of the pose, the graph's prediction apart; None when it says nothing."""
 
     def is_within(self, sigma_m: float) -> bool:
-        """Tell whether its place is known this well in every direction, one standard deviation."""
+        """Return True if its place is known this well in every direction, one standard deviation."""
         return self.sigma_m <= sigma_m
 
     @property
@@ -185,7 +185,7 @@ class LocalMap:
         self._standings, self._sure = self._solved(settled), None
 
     def _is_fresh(self, standing: NodePoseEstimate) -> bool:
-        """Tell whether a node was measured so lately that the window cannot have drifted away from it."""
+        """Return True if a node was measured so lately that the window cannot have drifted away from it."""
         return self.way_m - standing.measured_m <= self._config.fresh_m
 
     def _solved(self, settled: dict[int, NodePoseEstimate]) -> dict[int, NodePoseEstimate]:

@@ -77,7 +77,7 @@ class NeighbourFinder:
                 yield replace(seam, share=0.0)
 
     def _is_open(self, here: NodePoseEstimate, there: NodePoseEstimate, grid: GridView) -> bool:
-        """Tell whether the robot could go from one to the other wherever the other may truly be."""
+        """Return True if the robot could go from one to the other wherever the other may truly be."""
         if _is_sure(there, self._config.seam_sigma_m):
             return True
         wide = replace(self._config, robot_radius_m=self._config.robot_radius_m + OPEN_SIGMAS * there.sigma_m)
@@ -98,7 +98,7 @@ class NeighbourFinder:
     def _shortens(
         self, node_id: int, other_id: int, line_m: float, graph: PagedGraph, reached: dict[int, Reached]
     ) -> bool:
-        """Tell whether the straight line beats the way over edges, those just added included."""
+        """Return True if the straight line beats the way over edges, those just added included."""
         way_m = reached[other_id].distance_m
         for edge in graph.edges_of(node_id):
             onward = graph.edge_between(edge.other(node_id), other_id)
@@ -115,12 +115,12 @@ class NeighbourFinder:
 
 
 def _is_sure(standing: NodePoseEstimate, sigma_m: float) -> bool:
-    """Tell whether a node stands in the window by measurement, or is predicted well enough."""
+    """Return True if a node stands in the window by measurement, or is predicted well enough."""
     return standing.anchored or standing.is_within(sigma_m)
 
 
 def directly_navigable(grid: GridView, start: Pose, end: Pose, config: TopoConfig) -> bool:
-    """Tell whether the robot can go straight between two places in the window; unknown cells say no."""
+    """Return True if the robot can go straight between two places in the window; unknown cells say no."""
     x, y = grid.origin_m
     line = (start[0] - x, start[1] - y, end[0] - x, end[1] - y)
     limits = (config.robot_radius_m, config.occupied_from)
@@ -128,7 +128,7 @@ def directly_navigable(grid: GridView, start: Pose, end: Pose, config: TopoConfi
 
 
 def in_sight(grid: GridView, start: Pose, end: Pose, config: TopoConfig) -> bool:
-    """Tell whether no wall stands between two places in the window."""
+    """Return True if no wall stands between two places in the window."""
     x, y = grid.origin_m
     line = (start[0] - x, start[1] - y, end[0] - x, end[1] - y)
     return bool(sight.line_is_clear(grid.occupancy, grid.resolution_m, *line, config.occupied_from))

@@ -34,7 +34,7 @@ def register(app: typer.Typer) -> None:
 
 
 def info(map_file: MapFile) -> None:
-    """Tell what a map holds."""
+    """Show what a map holds."""
     from lemtomap.robot.cli import map_file as files
 
     typer.echo(files.info(map_file))

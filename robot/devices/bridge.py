@@ -33,7 +33,7 @@ def sides_of_cliff(flags: Cliff) -> Sides:
 
 
 def on_adapter(sample: KobukiSample) -> bool:
-    """Tell whether the charging cable is in; driving would tear it out."""
+    """Return True if the charging cable is in; driving would tear it out."""
     return sample.battery.source is PowerSource.ADAPTER
 
 

@@ -24,7 +24,7 @@ ALARMING = frozenset(
     }
 )
 QUIET = frozenset(
-    {Reason.CLEAR, Reason.LIMIT, Reason.NEAR_OBSTACLE, Reason.VELOCITY_SILENT, Reason.NOT_PERMITTED}
+    {Reason.CLEAR, Reason.LIMIT, Reason.NEAR_OBSTACLE, Reason.COMMAND_TIMEOUT, Reason.NOT_PERMITTED}
 )
 REPEAT_S = 10.0  # the same sound is not played again sooner: a robot that nags is switched off
 

@@ -65,7 +65,7 @@ def find(identity: UsbIdentity, ports: ListPorts = list_ports.comports) -> str:
 
 
 def matches_identity(port: PortInfo, identity: UsbIdentity) -> bool:
-    """Tell whether a port shows this identity; a bare FTDI chip (0403:6001) may be anything, not a Kobuki."""
+    """Return True if a port has this identity; a bare FTDI chip (0403:6001) may be anything, not a Kobuki."""
     if (port.vid, port.pid) != (identity.vid, identity.pid):
         return False
     text = " ".join(part for part in (port.manufacturer, port.product, port.serial_number) if part).lower()

@@ -38,7 +38,7 @@ class Finder:
         return self._drive(moment)
 
     def _turning(self, moment: MissionInput) -> bool:
-        """Tell whether the robot still turns."""
+        """Return True if the robot still turns."""
         asked = self._asked_cycle
         if asked is None:
             return False

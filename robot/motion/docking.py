@@ -81,7 +81,7 @@ class DockingOutput:
 
     @property
     def finished(self) -> bool:
-        """Tell whether it is over, one way or the other."""
+        """Return True if it is over, one way or the other."""
         return self.state in {DockingState.DOCKED, DockingState.FAILED}
 
 
@@ -241,7 +241,7 @@ class Docking:
         return self._output(0.0, 0.0)
 
     def _on_dock(self, sample: KobukiSample) -> bool:
-        """Tell whether the charger's byte, not the debounced battery, names the dock now."""
+        """Return True if the charger's byte, not the debounced battery, names the dock now."""
         if sample.on_dock:
             return True
         self._confirm_since_s = None

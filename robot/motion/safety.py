@@ -6,7 +6,7 @@ restrictive wins, and the reason names the rule that took something away:
     reason            when                                          reaction
     bad command       NaN or infinite velocity                      stop
     not permitted     no one has said that the robot may move       stop
-    base silent       no base packet for 0.2 s                      stop, then settle
+    base timeout      no base packet for 0.2 s                      stop, then settle
     wheel drop        a wheel hangs in the air                      stop, then settle
     over-current      a motor draws too much                        stop, then settle
     settling          0.5 s after each of the three above           stop
@@ -14,8 +14,8 @@ restrictive wins, and the reason names the rule that took something away:
     battery empty     dangerously low for 5 s                       stop
     mapping hangs     a scan waits for the map for 0.25 s           stop
     navigation hangs  no cycle was begun for 0.25 s                 stop
-    velocity silent   no fresh velocity for 0.3 s                   stop
-    scan silent       no scan for 0.5 s and motion wanted           stop
+    command timeout   no fresh velocity for 0.3 s                   stop
+    scan timeout      no scan for 0.5 s and motion wanted           stop
     scan blind        (almost) no beam of the scan is valid         stop
     cliff             a cliff sensor sees no floor                  straight back, slowly, only
     bumper            a bumper is pressed                           forward: stop; else slow back, slow turn
@@ -46,7 +46,7 @@ class Reason(StrEnum):
     CLEAR = "clear"
     BAD_COMMAND = "bad command"
     NOT_PERMITTED = "not permitted"
-    BASE_SILENT = "base silent"
+    BASE_TIMEOUT = "base timeout"
     WHEEL_DROP = "wheel drop"
     OVER_CURRENT = "over-current"
     SETTLING = "settling"
@@ -54,8 +54,8 @@ class Reason(StrEnum):
     BATTERY_EMPTY = "battery empty"
     MAPPING_HANGS = "mapping hangs"
     NAVIGATION_HANGS = "navigation hangs"
-    VELOCITY_SILENT = "velocity silent"
-    SCAN_SILENT = "scan silent"
+    COMMAND_TIMEOUT = "command timeout"
+    SCAN_TIMEOUT = "scan timeout"
     SCAN_BLIND = "scan blind"
     CLIFF = "cliff"
     BUMPER = "bumper"
@@ -116,7 +116,7 @@ class Sides:
 
     @property
     def any(self) -> bool:
-        """Tell whether one of them is set."""
+        """Return True if one of them is set."""
         return self.left or self.centre or self.right
 
 
@@ -188,7 +188,7 @@ class SafetyGate:
         lim = self.limits
         serious = None
         if not _fresh(evidence.base_stamp_s, now_s, lim.base_age_s):
-            serious = Reason.BASE_SILENT
+            serious = Reason.BASE_TIMEOUT
         elif evidence.wheel_drop:
             serious = Reason.WHEEL_DROP
         elif evidence.over_current:
@@ -224,11 +224,11 @@ class SafetyGate:
     def _silence(self, v_mps: float, w_radps: float, evidence: Evidence, now_s: float) -> Reason | None:
         lim = self.limits
         if not _fresh(evidence.velocity_stamp_s, now_s, lim.velocity_age_s):
-            return Reason.VELOCITY_SILENT
+            return Reason.COMMAND_TIMEOUT
         if v_mps == 0.0 and w_radps == 0.0:
             return None
         if not _fresh(evidence.scan_stamp_s, now_s, lim.scan_age_s):
-            return Reason.SCAN_SILENT
+            return Reason.SCAN_TIMEOUT
         if evidence.valid_beams < lim.scan_valid_beams:
             return Reason.SCAN_BLIND
         return None

@@ -17,7 +17,7 @@ class RunFault(LemtomapError):
 
 
 def conclude(summary: Mapping[str, Any]) -> None:
-    """Tell how the run went, and end the command with the right code.
+    """Print how the run went, and end the command with the right code.
 
     Raises KeyboardInterrupt after an interrupted run, RunFault after a fault, typer.Exit else.
     """

@@ -5,5 +5,5 @@ import sys
 
 
 def has_display() -> bool:
-    """Tell whether a window could be opened here."""
+    """Return True if a window could be opened here."""
     return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -230,7 +230,7 @@ class Viewer:
         self._stream.set_time("run", duration=max(0.0, now_s))
 
     def _is_due(self, what: str, now_s: float, rate_hz: float) -> bool:
-        """Tell whether `what` may be logged again; a small slack keeps equal rates equal."""
+        """Return True if `what` may be logged again; a small slack keeps equal rates equal."""
         if now_s < self._due.get(what, -np.inf) - 0.005:
             return False
         self._due[what] = now_s + 1.0 / rate_hz

@@ -93,7 +93,7 @@ def test_the_robot_speeds_up_gently_and_stops_when_the_hand_lets_go(driving):
     speeds = [sent.v_mps for sent in driving.sent]
     assert max(b - a for a, b in pairwise(speeds)) <= 0.5 * 0.02 + 1e-9
     stopped = driving.drive(1.2)
-    assert (stopped.v_mps, stopped.reason) == (0.0, Reason.VELOCITY_SILENT)
+    assert (stopped.v_mps, stopped.reason) == (0.0, Reason.COMMAND_TIMEOUT)
 
 
 def test_a_bump_stops_at_once_backs_off_a_little_and_is_told(driving):
@@ -132,7 +132,7 @@ def test_a_lifted_robot_stops_and_settles_before_it_goes_on(driving):
 
 
 @pytest.mark.parametrize(
-    ("device", "reason"), [("kobuki", Reason.BASE_SILENT), ("hokuyo", Reason.SCAN_SILENT)], ids=str
+    ("device", "reason"), [("kobuki", Reason.BASE_TIMEOUT), ("hokuyo", Reason.SCAN_TIMEOUT)], ids=str
 )
 def test_a_pulled_plug_stops_in_one_step_and_a_replug_goes_on(driving, device, reason):
     getattr(driving.simulator, device).unplug()
@@ -171,7 +171,7 @@ def test_a_part_that_hangs_stops_the_robot_and_is_told_shown_and_heard_once(driv
     assert driving.signals[-2:] == [Light(1, Led.RED), Play(Tune.ERROR)]
     setattr(driving, part, True)
     assert driving.drive(2.0, Twist(0.25, 0.0)).v_mps > 0.0
-    assert driving.said() == [f"no longer: {reason}"]
+    assert driving.said() == [f"cleared: {reason}"]
 
 
 def test_a_robot_whose_navigation_never_begins_says_so():

@@ -59,7 +59,7 @@ def ratio(old: Sequence[float], new: Sequence[float]) -> tuple[float, float, flo
 
 
 def changed(old: Sequence[float], new: Sequence[float]) -> bool:
-    """Tell whether two values or two series differ by more than noise."""
+    """Return True if two values or two series differ by more than noise."""
     middle, low, high = ratio(old, new)
     return abs(middle - 1.0) > NOISE if np.isnan(low) else not low <= 1.0 <= high
 

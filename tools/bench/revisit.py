@@ -141,7 +141,7 @@ def _walls_crossed(mapper: TopoMapper, born: dict[int, Pose], raster: Raster) ->
 
 
 def crosses(raster: Raster, a: Pose, b: Pose) -> bool:
-    """Tell whether a wall of the true plan lies on the straight line between two places."""
+    """Return True if a wall of the true plan lies on the straight line between two places."""
     steps = max(2, int(np.hypot(*(b[:2] - a[:2])) / (0.4 * raster.resolution_m)))
     points = a[:2] + np.linspace(0.0, 1.0, steps)[:, None] * (b[:2] - a[:2])
     cols, rows = np.floor((points - np.array(raster.origin_m)) / raster.resolution_m).astype(int).T

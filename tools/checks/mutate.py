@@ -28,7 +28,7 @@ from tools.checks.mutants import Mutant, random_mutants
 from tools.checks.safety_mutants import MUTANTS as SAFETY_MUTANTS
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-COPIED = ("drivers", "lemtomap", "robot", "sim", "tools", "tests", "pyproject.toml")
+COPIED = ("drivers", "lemtomap", "robot", "sim", "tools", "tests", "docs", "README.md", "pyproject.toml")
 MISSIONS = [
     f"tests/robot/{name}.py"
     for name in ("missions/test_lost", "missions/test_mission", "runs/test_lockstep", "test_reactions")
@@ -44,6 +44,7 @@ LONGEST_S = 600.0  # of one round of tests: a mutant that never ends is noticed 
 FAILED = 1  # pytest: some tests failed
 BROKEN = 2  # pytest: they could not even be imported, which is noticed too
 NONE_FOUND = 5
+ABORTED = 134  # by a shell's count: 128 + SIGABRT
 
 
 class Sandbox:
@@ -101,6 +102,8 @@ class Sandbox:
             )
         except subprocess.TimeoutExpired:
             return f"no end within {LONGEST_S:.0f} s"
+        if run.returncode < 0 or run.returncode == ABORTED:
+            return "the interpreter crashed"  # a kernel wrote past its array, which is noticed as well
         if run.returncode in {FAILED, BROKEN}:
             failed = re.search(r"^(?:FAILED|ERROR) (\S+)", run.stdout, re.MULTILINE)
             return failed[1] if failed else "tests that cannot run"
@@ -183,6 +186,9 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("where", nargs="*", help="folders or files, from the root of the checkout")
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--skip", type=int, default=0, help="the first of them, tried in a run that was cut off"
+    )
     parser.add_argument("--safety", action="store_true", help="the hand-made mutants of the safety chain")
     parser.add_argument("--only", default="", help="those whose name contains this")
     options = parser.parse_args(arguments)
@@ -203,7 +209,7 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2
-    chosen = [mutant for mutant in chosen if options.only in mutant.name]
+    chosen = [mutant for mutant in chosen if options.only in mutant.name][options.skip :]
     survivors = 0
     with tempfile.TemporaryDirectory() as name:
         sandbox = Sandbox(root, Path(name))

@@ -37,7 +37,7 @@ class Reference:
         return between(between(self.T_map_base[a], self.T_map_base[b]), T_a_b)
 
     def vouches(self, a: int, b: int) -> bool:
-        """Tell whether a relation joins the stretches of the drive around two scans."""
+        """Return True if a relation joins the stretches of the drive around two scans."""
         wanted = np.array([self.way_m[a], self.way_m[b]])
         gaps = np.minimum(
             np.abs(self.ends_m - wanted).max(axis=1), np.abs(self.ends_m - wanted[::-1]).max(axis=1)

@@ -25,7 +25,7 @@ GLANCE = 0.1  # cosine: a look along a surface does not tell which of its sides 
 
 @njit(nogil=True, cache=True)
 def is_other_face(nx: float, ny: float, whence: Array, to_x: float, to_y: float) -> bool:
-    """Tell whether a cell was seen from the other side of its surface, normal (nx, ny), than a hit is now,
+    """Return True if a cell was seen from the other side of its surface, normal (nx, ny), than a hit is now,
     whose laser lies at (to_x, to_y) from it.
     """
     now = nx * to_x + ny * to_y

@@ -121,7 +121,7 @@ def in_front(hits: Array, gap: float, compact: float) -> Array:
 
 @njit(nogil=True, cache=True)
 def outside(points: Array, pose: Array, origin: Array, n: int, resolution: float) -> bool:
-    """Tell whether the robot or a point falls outside the window."""
+    """Return True if the robot or a point falls outside the window."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for i in range(points.shape[0]):
         x = pose[0] + c * points[i, 0] - s * points[i, 1]

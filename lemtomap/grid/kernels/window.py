@@ -30,7 +30,7 @@ WHOLE = 65535.0
 
 @njit(nogil=True, cache=True)
 def _reaches_out(offsets: Array, n: int, origin: Array, gx: int, gy: int) -> bool:
-    """Tell whether the cells around one may lie outside the window, or across the ring's seam in memory."""
+    """Return True if the cells around one may lie outside the window, or across the ring's seam in memory."""
     last = offsets.shape[0] - 1  # the furthest: no coordinate of any is larger than both of its together
     reach = abs(offsets[last, 0]) + abs(offsets[last, 1])
     x, y, col, row = gx - origin[0], gy - origin[1], gx % n, gy % n

@@ -69,7 +69,7 @@ class _Pursuit:
 
     @property
     def direct(self) -> bool:
-        """Tell whether the goal is the opening itself, not the node from which it was seen."""
+        """Return True if the goal is the opening itself, not the node from which it was seen."""
         return self.goal.p_node != AT_NODE
 
 

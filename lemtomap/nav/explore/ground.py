@@ -48,7 +48,7 @@ class Ground:
         return cls(reach, large, np.asarray(leads))
 
     def still_open(self, p_grid: ArrayLike) -> bool:
-        """Tell whether an opening that was not found again at its place may still lead to unseen ground.
+        """Return True if an opening that was not found again at its place may still lead to unseen ground.
 
         It does not where the window shows the floor up to it; it may where that has been forgotten, or where
         only a few beams came by: they make a way up to it, but no edge wide enough to be found.
@@ -62,7 +62,7 @@ class Ground:
         return bool(kernels.dark_in_sight(costs.state, self.large, *costs.cell(p_grid), NEAR_CELLS + 2.0))
 
     def walled_off(self, p_grid: ArrayLike, q_grid: ArrayLike) -> bool:
-        """Tell whether an obstacle stands between two places."""
+        """Return True if an obstacle stands between two places."""
         return self._worst(p_grid, q_grid) == kernels.LETHAL
 
     def node_in_sight(self, p_grid: ArrayLike, T_grid_node: Mapping[int, Pose], otherwise_id: int) -> int:

@@ -127,7 +127,7 @@ class Openings:
         return number if receded_m <= RECEDED_M else None
 
     def _is_nothing(self, opening: Opening, gone: int | None) -> bool:
-        """Tell whether an opening is enough to go on with but too little to begin with, or a sham."""
+        """Return True if an opening is enough to go on with but too little to begin with, or a sham."""
         return opening.size_m < self._least_size_m or (gone is not None and self._gone[gone].gone >= SHAMS)
 
     def _reopen(self, kept: _Kept, now_s: float) -> None:

@@ -127,7 +127,7 @@ def worst_between(state: U1, row0: float, col0: float, row1: float, col1: float)
 
 @njit(nogil=True, cache=True)
 def dark_in_sight(state: U1, large: U1, row: float, col: float, radius: float) -> bool:
-    """Tell whether a large unseen patch lies within radius (cells) of a place, not behind an obstacle.
+    """Return True if a large unseen patch lies within radius (cells) of a place, not behind an obstacle.
 
     The place is moved to the nearest free cell within the radius; without one nothing can be told: True.
     """
@@ -153,7 +153,7 @@ def dark_in_sight(state: U1, large: U1, row: float, col: float, radius: float) -
 
 @njit(nogil=True, cache=True)
 def barely_shown(state: U1, large: U1, row: float, col: float, radius: float) -> bool:
-    """Tell whether of the ground in sight within radius (cells) of a place less is shown than hidden.
+    """Return True if of the ground in sight within radius (cells) of a place less is shown than hidden.
 
     Large unseen patches count as neither, but one must be in sight.
     """

@@ -40,7 +40,7 @@ class Costs:
         return (y - self.origin_m[1]) / self.resolution_m, (x - self.origin_m[0]) / self.resolution_m
 
     def holds(self, p_grid: ArrayLike, margin_m: float = 0.0) -> bool:
-        """Tell whether a point lies inside the window, at least margin_m from its border."""
+        """Return True if a point lies inside the window, at least margin_m from its border."""
         row, col = self.cell(p_grid)
         margin = margin_m / self.resolution_m
         rows, cols = self.state.shape
@@ -175,7 +175,7 @@ class Costmap:
             kernels.clear_cells(layer.last_hit_s, layer.hits, cells, stamp_s)
 
     def _scanned(self, cells: NDArray[np.float64], now_s: float) -> NDArray[np.bool_]:
-        """Tell which cells, float64 (N, 2), the laser has something in or beside, bool (N,).
+        """Return which cells, float64 (N, 2), the laser has something in or beside, bool (N,).
 
         It then watches them: what a camera keeps for long is only what the laser overlooks. A person whom
         both saw is gone when the laser looks through where he stood.

@@ -75,7 +75,7 @@ class Follower:
         return Step(approach(twist, choice.twist, body, config.period_s), FollowerState.DRIVE)
 
     def at_goal(self, end_m: float, tolerance_m: float) -> bool:
-        """Tell whether the spot is reached; then turning may stray by as much again."""
+        """Return True if the spot is reached; then turning may stray by as much again."""
         self._reached = end_m <= (2.0 * tolerance_m if self._reached else tolerance_m)
         return self._reached
 

@@ -73,7 +73,7 @@ class ProgressWatch:
         return now_s - self._since_s > self._config.progress_s
 
     def _proved_longer(self, remaining_m: float) -> bool:
-        """Tell whether a good piece was made good of a way that is longer than it was believed to be."""
+        """Return True if a good piece was made good of a way that is longer than it was believed to be."""
         made_good_m = self._longest_m - remaining_m
         return self._rises < self._config.longer_ways and made_good_m >= self._config.longer_way_m
 

@@ -54,7 +54,7 @@ def find_barrier(route: Route, T_grid_node: Mapping[int, Pose], reach: Reach, be
 
 
 def _is_filled(costs: Costs, p_a_grid: Pose, p_b_grid: Pose) -> bool:
-    """Tell whether something stands on the line from a to b and nothing beside it lets the robot by."""
+    """Return True if something stands on the line from a to b and nothing beside it lets the robot by."""
     if cut_at(costs, p_a_grid, p_b_grid) is None:
         return False
     rows, cols = costs.state.shape

@@ -42,7 +42,7 @@ class FreshGraph:
         return self._rows
 
     def has_node(self, node_id: int) -> bool:
-        """Tell whether the file or the view knows this node."""
+        """Return True if the file or the view knows this node."""
         return node_id in self._newborn or self._graph.has_node(node_id)
 
     def edges_of(self, node_id: int) -> Sequence[RouteEdge]:

@@ -94,7 +94,7 @@ def choose_target(
 
 
 def is_roundabout(route: Route, goal: Goal, target: Target, way_m: float) -> bool:
-    """Tell whether a way over unseen floor to the goal is far too long: it leads through gaps in walls.
+    """Return True if a way over unseen floor to the goal is far too long: it leads through gaps in walls.
 
     way_m: the way to the target. A robot on either way finds the same the further it gets along it.
     """
@@ -104,13 +104,13 @@ def is_roundabout(route: Route, goal: Goal, target: Target, way_m: float) -> boo
 
 
 def _is_here(target: Target, reach: Reach) -> bool:
-    """Tell whether the robot stands where a target is: then only unseen floor leads on."""
+    """Return True if the robot stands where a target is: then only unseen floor leads on."""
     away = math.dist((target.cell[0] + 0.5, target.cell[1] + 0.5), reach.start)
     return away * reach.costs.resolution_m <= HERE_M
 
 
 def _is_bound_for(target: Target, p_grid: tuple[float, float] | None, costs: Costs) -> bool:
-    """Tell whether a target over unseen floor is the place the robot is on its way to."""
+    """Return True if a target over unseen floor is the place the robot is on its way to."""
     if p_grid is None:
         return False
     row, col = costs.cell(p_grid)

@@ -99,11 +99,11 @@ class BarrierWatch:
         return near and now_s - self._first_s >= self._config.polite_wait_s
 
     def _seen(self, barrier: Barrier) -> bool:
-        """Tell whether the newest hits show something at the barrier."""
+        """Return True if the newest hits show something at the barrier."""
         return bool(self._past) and bool(len(_around(self._past[-1][1], barrier, SEEN_M)))
 
     def moving(self, barrier: Barrier) -> bool:
-        """Tell whether around the barrier something is hit where nothing was hit a moment ago."""
+        """Return True if around the barrier something is hit where nothing was hit a moment ago."""
         if len(self._past) < 2:
             return False
         (_, old), (_, new) = self._past[0], self._past[-1]

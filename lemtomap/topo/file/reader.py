@@ -84,7 +84,7 @@ class TopoReader:
         self._version = newest
 
     def has_node(self, node_id: int) -> bool:
-        """Tell whether the map knows this node."""
+        """Return True if the map knows this node."""
         with schema.guarded(self.path):
             return self._db.execute("SELECT 1 FROM node WHERE id = ?", (node_id,)).fetchone() is not None
 

@@ -92,7 +92,7 @@ def seen_cells(
 
 @njit(nogil=True, cache=True)
 def same_face(nx: float, ny: float, targets: Values, t: int) -> bool:
-    """Tell whether a boundary whose front looks along (nx, ny) can be what was hit there.
+    """Return True if a boundary whose front looks along (nx, ny) can be what was hit there.
 
     A wall has two faces: what shows its back to where the hit was seen from is the other one, as far away as
     the wall is thick. (0, 0) stands for a front that is not known.

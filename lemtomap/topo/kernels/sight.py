@@ -20,7 +20,7 @@ def line_is_navigable(
     radius: float,
     occupied_from: int,
 ) -> bool:
-    """Tell whether a disc can go straight from (x0, y0) to (x1, y1); metres from the corner of cell [0, 0].
+    """Return True if a disc can go straight from (x0, y0) to (x1, y1); metres from the corner of cell [0, 0].
 
     Same as a line over the inflated map: every cell under the line is known and free, and no occupied cell
     lies within `radius` of it.
@@ -58,7 +58,7 @@ def line_is_navigable(
 def line_is_clear(
     occupancy: Cells, resolution: float, x0: float, y0: float, x1: float, y1: float, occupied_from: int
 ) -> bool:
-    """Tell whether no occupied cell lies on the line; unknown cells and those outside do not block sight."""
+    """Return True if no occupied cell is on the line; unknown cells and those outside do not block sight."""
     rows, cols = occupancy.shape
     steps = max(1, math.ceil(2.0 * math.hypot(x1 - x0, y1 - y0) / resolution))
     for k in range(steps + 1):

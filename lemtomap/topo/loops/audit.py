@@ -30,7 +30,7 @@ class Trial:
     contradicted: int = 0
 
     def is_lost(self, config: AuditConfig) -> bool:
-        """Tell whether more speaks against them than for them."""
+        """Return True if more speaks against them than for them."""
         return self.contradicted >= max(config.least_against, self.support + self.confirmed)
 
 

@@ -79,12 +79,12 @@ class LoopCloser:
         self.places.forget()
 
     def is_joined(self, node_id: int) -> bool:
-        """Tell whether a node hangs together with the robot's; True while that is not known."""
+        """Return True if a node hangs together with the robot's; True while that is not known."""
         outlook = self._outlook
         return outlook is None or not outlook.done or node_id in outlook
 
     def sees_parts_apart(self) -> bool:
-        """Tell whether the map has parts not joined to the robot's; asked once for each outlook."""
+        """Return True if the map has parts not joined to the robot's; asked once for each outlook."""
         outlook = self._outlook
         if outlook is None or not outlook.done or len(outlook) >= self.config.gate.outlook_nodes:
             return False
@@ -271,7 +271,7 @@ class LoopCloser:
             task.hearing_for.heard = True
 
     def _is_news(self, match: SearchMatch, task: Task) -> bool:
-        """Tell whether a search found a place where the mapper does not have it anyway."""
+        """Return True if a search found a place where the mapper does not have it anyway."""
         return (
             self._judge.is_sighting(match, task)
             and not self._confirms(match, task)

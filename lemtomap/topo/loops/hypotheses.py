@@ -111,7 +111,7 @@ class Hypotheses:
         return None
 
     def _agrees(self, earlier: Sighting, later: Sighting) -> bool:
-        """Tell whether two sightings put the old map at the same place in the window."""
+        """Return True if two sightings put the old map at the same place in the window."""
         T_earlier_later = self._around(earlier.node_id).get(later.node_id)
         if T_earlier_later is None:
             return False

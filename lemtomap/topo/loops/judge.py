@@ -28,7 +28,7 @@ class Judge:
         return self.places.alone(task.node_id) if task.on_trial else self.places.company(task.node_id)
 
     def is_sighting(self, match: SearchMatch, task: Task) -> bool:
-        """Tell whether a place was found: most of it seen, little against it, no other pose as good."""
+        """Return True if a place was found: most of it seen, little against it, no other pose as good."""
         config = self.config
         company = self.company(task)
         explained = match.explained * match.known * (0 if company is None else len(company.points_node))
@@ -43,7 +43,7 @@ class Judge:
         )
 
     def is_alias(self, match: SearchMatch, task: Task) -> bool:
-        """Tell whether a place found elsewhere than the graph has it only resembles what is known there.
+        """Return True if a place found elsewhere than the graph has it only resembles what is known there.
 
         A corridor of like rooms shows each place again a door further on. Where the robot's own node is not
         sure the search is wide, for the window may have slipped along; but then what the graph has there must
@@ -109,7 +109,7 @@ class Judge:
         return float(along * 0.5 ** sum(doubts))
 
     def contradicts(self, task: Task) -> bool:
-        """Tell whether the window shows something else where a belief says that a place must be."""
+        """Return True if the window shows something else where a belief says that a place must be."""
         company = self.company(task)
         if company is None or task.T_grid_followed is None:
             return False

@@ -106,7 +106,7 @@ class Locator:
         self._view: _View | None = None
 
     def due(self, travelled_m: float, turned_rad: float) -> bool:
-        """Tell whether the robot has moved enough for another look."""
+        """Return True if the robot has moved enough for another look."""
         seen = None if self._view is None else self._view.look
         return seen is None or (
             travelled_m - seen.travelled_m >= self.config.look_m
@@ -221,7 +221,7 @@ class Locator:
         return best
 
     def _same(self, a: Guess, b: Guess) -> bool:
-        """Tell whether two guesses put the robot at the same place of the map."""
+        """Return True if two guesses put the robot at the same place of the map."""
         T_a_b = self.places.around(a.node_id, self.config.follow_m, 48).get(b.node_id)
         if T_a_b is None:
             return False
@@ -232,7 +232,7 @@ class Locator:
         )
 
     def _same_by_far(self, best: Guess, other: Guess) -> bool:
-        """Tell whether a guess as good as the best is the same place, mapped twice and not yet joined.
+        """Return True if a guess as good as the best is the same place, mapped twice and not yet joined.
 
         The graph then puts both nodes where the guesses do, up to the drift on the way from one to the other.
         """
@@ -277,7 +277,7 @@ class Locator:
         return Found(best.node_id, best.T_grid_node, best.match.covariance)
 
     def _beats(self, best: Guess, rival: Guess, view: "_View") -> bool:
-        """Tell whether a guess fits clearly better, or alone explains what the other never makes up for."""
+        """Return True if a guess fits clearly better, or alone explains what the other never makes up for."""
         if best.fit - rival.fit >= self.config.margin:
             return True
         one, other = self._seen_in(best), self._seen_in(rival)
@@ -291,7 +291,7 @@ class Locator:
         return None if company is None else Placed(self._picture(company), guess.T_grid_node)
 
     def _is_sound(self, guess: Guess, match: SearchMatch, view: "_View", weakest: float) -> bool:
-        """Tell whether a guess has borne every check of late, on walls that hold it in every direction.
+        """Return True if a guess has borne every check of late, on walls that hold it in every direction.
 
         weakest: share of the strongest direction's information on the weakest, at least. Along a corridor
         little more than door posts hold it; where another place would have fitted, it was a guess as well.

@@ -57,7 +57,7 @@ class PlaceBook:
         return kept(self._descriptors, node_id, DESCRIPTORS_KEPT, self._describe)
 
     def has(self, node_id: int) -> bool:
-        """Tell whether a node has localisation data to be known again by."""
+        """Return True if a node has localisation data to be known again by."""
         return self.descriptor(node_id) is not None
 
     def alone(self, node_id: int) -> LocalSubmap | None:

@@ -86,7 +86,7 @@ def _older_beside(
 
 
 def _wall_between(graph: PagedGraph, node_id: int, T_node_other: Pose, config: PruneConfig) -> bool:
-    """Tell whether stored obstacles of a node lie on the line to another; a node without data sees none."""
+    """Return True if stored obstacles of a node lie on the line to another; a node without data sees none."""
     place = graph.store.place(node_id)
     if place is None:
         return False
@@ -101,7 +101,7 @@ def _from_line_m(points: NDArray[np.float64], end: NDArray[np.float64]) -> NDArr
 
 
 def _ways_stay(graph: PagedGraph, node_id: int, config: PruneConfig) -> bool:
-    """Tell whether any two neighbours are as near to each other without a node, or nearly straight."""
+    """Return True if any two neighbours are as near to each other without a node, or nearly straight."""
     edges = list(graph.edges_of(node_id))
     straight = {edge.other(node_id): edge.seen_from(node_id)[:2] for edge in edges}
     over = {edge.other(node_id): _way_m(edge) for edge in edges}
@@ -114,7 +114,7 @@ def _ways_stay(graph: PagedGraph, node_id: int, config: PruneConfig) -> bool:
 
 
 def _joined_without(graph: PagedGraph, ends: tuple[int, int], without_id: int, limit_m: float) -> bool:
-    """Tell whether a way of at most this length joins two nodes without a third (Dijkstra)."""
+    """Return True if a way of at most this length joins two nodes without a third (Dijkstra)."""
     start, goal = ends
     queue, done = [(0.0, start)], {without_id}
     while queue:

@@ -140,7 +140,7 @@ def normal_equations(beams, pose, window, normals, sigma_m, point_weight):
 
 
 def _other_face(axis, whence, to_laser):
-    """Tell whether two looks at a surface are sure to come from its two sides."""
+    """Return True if two looks at a surface are sure to come from its two sides."""
     then, now = float(axis @ whence), float(axis @ to_laser) / math.hypot(*to_laser)
     return then * now < 0.0 and min(abs(then), abs(now)) >= 0.1
 

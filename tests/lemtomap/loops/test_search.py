@@ -172,3 +172,23 @@ def test_covariance_is_in_the_places_own_axes():
     own = transform(inverse(T_grid_place), corridor)
     match = reference.refine(own, compose(T_grid_place, np.array([0.0, 0.02, 0.0])))
     assert match.covariance[1, 1] > 25 * match.covariance[0, 0]
+
+
+def test_a_search_with_too_little_room_for_its_blocks_ends_and_says_so():
+    """Eight children at most come of one block: with fewer places left the search is given up, unharmed."""
+    reference = Reference(view_of(room()), room(), SearchConfig())
+    cells = np.ascontiguousarray(room() / reference.cell_m)
+    box = np.array([90, 190, 90, 190, 0, 60], np.int64)
+    keys, blocks = np.full(64, -1, np.int64), np.zeros((64, 4), np.int32)
+    shared = (0.0, np.pi / 30, 1)
+    lists = (keys[:24], blocks[:24])
+    size, _, planted = kernels.plant(
+        reference.stack, cells, SearchConfig().levels - 2, box, *shared, *lists, 0, 0, 10**6
+    )
+    assert (size, planted) == (24, -1)
+    state, size, *_ = kernels.dig(
+        reference.stack, cells, box, np.zeros(6, np.int64), *shared, *lists, size, 10**9
+    )
+    assert state == 3
+    assert size <= 24
+    assert (keys[24:] == -1).all()

@@ -213,3 +213,18 @@ def test_no_match_claims_to_be_surer_than_windows_are_straight():
     sigmas = np.sqrt(np.diag(match.covariance))
     assert np.all(sigmas[:2] > 0.9 * AlignConfig().bend_m)
     assert sigmas[2] > 0.9 * AlignConfig().bend_rad
+
+
+def test_a_hit_is_believed_beside_an_occupied_cell_and_not_two_cells_off():
+    """On any of its four sides: a hit that two cells part from the wall is a chair that was moved."""
+    for row, col in ((0, 2), (0, -2), (2, 0), (-2, 0)):
+        owner, taken = np.full((480, 480, 2), np.iinfo(np.int32).min, np.int32), np.zeros((480, 480), np.int8)
+        ring = (owner, taken, np.zeros((480, 480, 6)))
+        occupancy = np.zeros((40, 40), np.int8)
+        occupancy[20 + row, 20 + col] = 100
+        hits = np.full((4, 2), 0.525)
+        gathering.add_hits(hits, pose(-0.5, -0.5, 0), 0.05, *ring, 0.0, 10.0)
+        window = (occupancy, 0.05, -1.0, -1.0, 50)
+        assert len(gathering.collect_hits(*ring, 0.05, 0.0, 0.0, 1.0, 1.0, -1.0, *window)) == 0
+        occupancy[20 + row // 2, 20 + col // 2] = 100
+        assert len(gathering.collect_hits(*ring, 0.05, 0.0, 0.0, 1.0, 1.0, -1.0, *window)) == 1

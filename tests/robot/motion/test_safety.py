@@ -52,9 +52,9 @@ def verdict(v, w, ev, now=NOW):
 STOPS = [
     ("nan speed", (math.nan, 0.0), {}, Reason.BAD_COMMAND),
     ("infinite turn", (0.1, math.inf), {}, Reason.BAD_COMMAND),
-    ("base never heard", (0.3, 0.0), {"base_stamp_s": -math.inf}, Reason.BASE_SILENT),
-    ("base just too old", (0.3, 0.0), {"base_stamp_s": NOW - 0.2001}, Reason.BASE_SILENT),
-    ("base stamp from the future", (0.3, 0.0), {"base_stamp_s": NOW + 0.0501}, Reason.BASE_SILENT),
+    ("base never heard", (0.3, 0.0), {"base_stamp_s": -math.inf}, Reason.BASE_TIMEOUT),
+    ("base just too old", (0.3, 0.0), {"base_stamp_s": NOW - 0.2001}, Reason.BASE_TIMEOUT),
+    ("base stamp from the future", (0.3, 0.0), {"base_stamp_s": NOW + 0.0501}, Reason.BASE_TIMEOUT),
     ("wheel drop", (0.0, 0.0), {"wheel_drop": True}, Reason.WHEEL_DROP),
     ("over-current", (0.0, 0.0), {"over_current": True}, Reason.OVER_CURRENT),
     ("charging cable", (-0.1, 0.0), {"adapter": True}, Reason.ADAPTER),
@@ -67,10 +67,10 @@ STOPS = [
         {"cycle_stamp_s": NOW - 0.2501, "velocity_stamp_s": -math.inf},
         Reason.NAVIGATION_HANGS,
     ),
-    ("velocity just too old", (0.3, 0.0), {"velocity_stamp_s": NOW - 0.3001}, Reason.VELOCITY_SILENT),
-    ("velocity never given", (0.0, 0.0), {"velocity_stamp_s": -math.inf}, Reason.VELOCITY_SILENT),
-    ("scan just too old", (0.3, 0.0), {"scan_stamp_s": NOW - 0.5001}, Reason.SCAN_SILENT),
-    ("turning without scan", (0.0, 0.3), {"scan_stamp_s": -math.inf}, Reason.SCAN_SILENT),
+    ("velocity just too old", (0.3, 0.0), {"velocity_stamp_s": NOW - 0.3001}, Reason.COMMAND_TIMEOUT),
+    ("velocity never given", (0.0, 0.0), {"velocity_stamp_s": -math.inf}, Reason.COMMAND_TIMEOUT),
+    ("scan just too old", (0.3, 0.0), {"scan_stamp_s": NOW - 0.5001}, Reason.SCAN_TIMEOUT),
+    ("turning without scan", (0.0, 0.3), {"scan_stamp_s": -math.inf}, Reason.SCAN_TIMEOUT),
     ("laser covered", (0.3, 0.0), {"valid_beams": 9}, Reason.SCAN_BLIND),
 ]
 

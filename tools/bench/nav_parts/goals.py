@@ -60,7 +60,7 @@ class Verdict:
 
     @property
     def right(self) -> bool:
-        """Tell whether it did what was wanted."""
+        """Return True if it did what was wanted."""
         reached = self.state == "arrived" and self.off_m <= TRUE_M
         return reached if self.wanted == "reach" else self.state == "failed" or self.wanted == "either"
 
@@ -172,7 +172,7 @@ class GoalTour:
 
 
 def pushes(rig: Rig) -> bool:
-    """Tell whether the robot is moving towards what it touches now."""
+    """Return True if the robot is moving towards what it touches now."""
     body = rig.simulator.base.body
     odometry = rig.core.exchange.odometry.get()
     if odometry is None or abs(odometry.v_mps) < 0.02:

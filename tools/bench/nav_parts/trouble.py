@@ -117,7 +117,7 @@ class Drive:
         self._counted = truth.contact_count
 
     def _in_sight(self, T_world_base: Pose) -> bool:
-        """Tell whether no wall of the plan, in which the barrier is not, stands before it."""
+        """Return True if no wall of the plan, in which the barrier is not, stands before it."""
         raster = self.rig.simulator.world.raster
         line = np.linspace(T_world_base[:2], self.barrier[:2], round(IN_SIGHT_M / raster.resolution_m))
         return not any(raster.occupied[raster.cell(x, y)] for x, y in line.tolist())

@@ -145,7 +145,7 @@ def _told(found: Found, robot: SimRobot, judged: JudgedMap, path: Path, *, notic
 
 
 def _is_joined(judged: JudgedMap) -> bool:
-    """Tell whether the robot's node hangs together with the map of before."""
+    """Return True if the robot's node hangs together with the map of before."""
     return 1 in judged.topo.graph.reach(judged.view.associated_id, 1e9)
 
 

@@ -74,7 +74,7 @@ def wrong_closures(log: Path, picture: Path) -> int:
 
 
 def is_wrong(off: Pose) -> bool:
-    """Tell whether a closure is so far from the truth that it means another place."""
+    """Return True if a closure is so far from the truth that it means another place."""
     return bool(np.hypot(off[0], off[1]) > WRONG_M or abs(off[2]) > WRONG_RAD)
 
 
