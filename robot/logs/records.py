@@ -78,7 +78,7 @@ class RecordedLog:
         no_return_m = min(self.no_return_m, laser.no_return_m)
         return Scan(
             stamp_s=record.stamp_s,
-            ranges_m=ranges.told_apart(record.ranges_m, np.float32(no_return_m)),
+            ranges_m=ranges.told_apart(record.ranges_m, float(np.float32(no_return_m))),
             angle_min_rad=laser.angle_min_rad,
             angle_step_rad=laser.angle_step_rad,
             time_step_s=laser.time_step_s,

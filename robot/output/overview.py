@@ -2,6 +2,7 @@
 
 import pickle
 import subprocess
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -37,10 +38,15 @@ class WallSketch:
         if len(self._kept) >= self._capacity:
             self._kept, self._stride = self._kept[::2], self._stride * 2
 
-    def points(self, T_map_base: Mapping[float, Pose]) -> NDArray[np.float64]:
-        """Return all beam ends, float64 (N, 2), metres, by each scan's final pose (none: left out)."""
-        placed = [se2.transform(T_map_base[key], points) for key, points in self._kept if key in T_map_base]
-        return np.concatenate(placed) if placed else np.zeros((0, 2))
+    def points(self, T_map_base: Mapping[float, Pose]) -> NDArray[np.float32]:
+        """Return all beam ends, float32 (N, 2), metres, by each scan's final pose (none: left out)."""
+        known = [(T_map_base[key], points) for key, points in self._kept if key in T_map_base]
+        placed = np.empty((sum(len(points) for _, points in known), 2), np.float32)
+        begin = 0
+        for pose, points in known:
+            placed[begin : begin + len(points)] = se2.transform(pose, points)
+            begin += len(points)
+        return placed
 
 
 @dataclass(frozen=True)
@@ -51,8 +57,8 @@ class Overview:
     edges: Sequence[tuple[int, int, EdgeType]]
     trajectory: Pose
     """float64 (N, 3), T_map_base."""
-    walls: NDArray[np.float64]
-    """float64 (N, 2), beam ends."""
+    walls: NDArray[np.floating]
+    """(N, 2), beam ends."""
     grid: GridView
     T_map_grid: Pose
     names: Mapping[int, str] = field(default_factory=dict)
@@ -67,19 +73,21 @@ def draw(path: Path, overview: Overview) -> None:
     process fails.
     """
     plain = replace(overview, T_map_node=dict(overview.T_map_node), names=dict(overview.names))
-    told = pickle.dumps(plain, protocol=pickle.HIGHEST_PROTOCOL)
     command = python("-m", "lemtomap.robot.output.painting")
-    try:
-        painter = subprocess.run(  # noqa: S603 - our own interpreter and module
-            command,
-            input=told,
-            capture_output=True,
-            check=False,
-            timeout=PAINT_LIMIT_S,
-            start_new_session=True,  # a Ctrl-C that ends the run does not end the picture
-        )
-    except subprocess.TimeoutExpired as late:
-        raise OSError(f"{path}: not painted within {PAINT_LIMIT_S:.0f} s") from late
+    with tempfile.TemporaryFile() as told:
+        pickle.dump(plain, told, protocol=pickle.HIGHEST_PROTOCOL)  # piece by piece, not all of it at once
+        told.seek(0)
+        try:
+            painter = subprocess.run(  # noqa: S603 - our own interpreter and module
+                command,
+                stdin=told,
+                capture_output=True,
+                check=False,
+                timeout=PAINT_LIMIT_S,
+                start_new_session=True,  # a Ctrl-C that ends the run does not end the picture
+            )
+        except subprocess.TimeoutExpired as late:
+            raise OSError(f"{path}: not painted within {PAINT_LIMIT_S:.0f} s") from late
     if painter.returncode:
         said = painter.stderr.decode(errors="replace").strip().splitlines()
         raise OSError(f"{path}: the painter failed: {said[-1] if said else painter.returncode}")

@@ -72,7 +72,7 @@ def _draw_whole(axes: Axes, overview: Overview) -> None:
     axes.set_title("the whole map, solved once for this picture", fontsize=11)
 
 
-def _draw_walls(axes: Axes, walls: NDArray[np.float64]) -> None:
+def _draw_walls(axes: Axes, walls: NDArray[np.floating]) -> None:
     """Draw beam ends as a density image: a doubled wall shows as two lines."""
     if not len(walls):
         return
