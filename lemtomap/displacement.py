@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from lemtomap.kernels.nearness import share_near
 from lemtomap.se2 import Pose, between, transform
 from lemtomap.settings import within
 from lemtomap.types import Odometry, SlamUpdate
@@ -81,10 +81,10 @@ class _Seen:
         T_here_before = between(self.odometry.T_odom_base, before.odometry.T_odom_base)
         earlier = transform(T_here_before, before.hits_base)
         shares = [
-            np.isfinite(cKDTree(there).query(here[::COMPARED], distance_upper_bound=config.again_m)[0]).mean()
+            share_near(here, there, config.again_m, COMPARED)
             for here, there in ((earlier, self.hits_base), (self.hits_base, earlier))
         ]
-        return float(max(shares))
+        return max(shares)
 
 
 class Watch:

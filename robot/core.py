@@ -17,6 +17,7 @@ from lemtomap.robot.config import DevicesConfig
 from lemtomap.robot.exchange import Exchange, TimedScan
 from lemtomap.robot.mapping import MappingStep
 from lemtomap.robot.navigating import NavigationStep
+from lemtomap.robot.thread_times import ThreadTimes
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,7 @@ class Efforts:
     base: Effort = field(default_factory=Effort)
     mapping: Effort = field(default_factory=Effort)
     navigation: Effort = field(default_factory=Effort)
+    threads: ThreadTimes = field(default_factory=ThreadTimes)
 
 
 class RobotCore:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.grid.beams import Beams
+from lemtomap.grid.kernels import scan as kernels
 
 GAP_M = 0.3  # between neighbouring hits, at which one thing ends and another begins
 COMPACT_M = 0.8  # a person with arms and stride; a wall's end that looks so small is rare and soon grows
@@ -27,15 +28,4 @@ def is_foreground(hits_base: NDArray[np.floating]) -> NDArray[np.bool_]:
 
     At either end of the scan nothing tells what stands beside: that is kept.
     """
-    count = len(hits_base)
-    if count == 0:
-        return np.zeros(0, dtype=np.bool_)
-    gaps_m = np.hypot(*np.diff(hits_base, axis=0).T)
-    first = np.concatenate([[0], np.flatnonzero(gaps_m > GAP_M) + 1])
-    last = np.concatenate([first[1:] - 1, [count - 1]])
-    extent_m = np.hypot(*(hits_base[last] - hits_base[first]).T)
-    range_m = np.hypot(*hits_base.T)
-    before = np.where(first > 0, range_m[first - 1], 0.0)
-    after = np.where(last < count - 1, range_m[(last + 1) % count], 0.0)
-    in_front = (before > range_m[first]) & (after > range_m[last])
-    return np.repeat((extent_m <= COMPACT_M) & in_front, last - first + 1)
+    return kernels.in_front(hits_base, GAP_M, COMPACT_M)

@@ -12,7 +12,6 @@ from lemtomap.se2 import Pose
 SEES = 0.5  # information of the scan against the prediction's, from which on it judges the odometry
 FADES = 0.7  # from scan to scan, what a late stamp still means: half a second's worth at 10 Hz
 FIRST_STRETCHES = 2  # that the settings count for in the drift
-YAW = np.array([0.0, 0.0, 1.0])
 
 Information = NDArray[np.float64]
 
@@ -78,19 +77,26 @@ class OdometryNoise:
         Only a direction in which the scan sees has a say.
         """
         prior, share = self.prior(step), self._shares(step)
-        variance = np.array([prior.sigma_m**2, prior.sigma_m**2, prior.sigma_rad**2])
-        pull = information @ correction + correction / variance
-        along = np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
-        if along @ information @ along * prior.sigma_m**2 > SEES:
-            own = self._way_ratio * share.sigma_m**2
-            ratio = _surprise(along, pull, information, variance, own) / share.sigma_m**2
+        way, turn = prior.sigma_m**2, prior.sigma_rad**2
+        x, y, yaw = correction.tolist()
+        rows = information.tolist()
+        pull = [
+            h0 * x + h1 * y + h2 * yaw + own
+            for (h0, h1, h2), own in zip(rows, (x / way, y / way, yaw / turn), strict=True)
+        ]
+        c, s = math.cos(heading_rad), math.sin(heading_rad)
+        row = [c * h0 + s * h1 for h0, h1 in zip(rows[0], rows[1], strict=True)]
+        seen = c * row[0] + s * row[1]
+        if seen * way > SEES:
+            spread = way * (row[0] ** 2 + row[1] ** 2) + turn * row[2] ** 2
+            spread -= self._way_ratio * share.sigma_m**2 * seen**2
+            ratio = _surprise(c * pull[0] + s * pull[1], seen, spread) / share.sigma_m**2
             self._way_ratio = self._moved(self._way_ratio, ratio)
-        if (
-            information[2, 2] * prior.sigma_rad**2 > SEES
-            and share.sigma_rad > self._config.odometry_turns_rad
-        ):
-            own = self._turn_ratio * share.sigma_rad**2
-            ratio = _surprise(YAW, pull, information, variance, own) / share.sigma_rad**2
+        row, seen = rows[2], rows[2][2]
+        if seen * turn > SEES and share.sigma_rad > self._config.odometry_turns_rad:
+            spread = way * (row[0] ** 2 + row[1] ** 2) + turn * row[2] ** 2
+            spread -= self._turn_ratio * share.sigma_rad**2 * seen**2
+            ratio = _surprise(pull[2], seen, spread) / share.sigma_rad**2
             self._turn_ratio = self._moved(self._turn_ratio, ratio)
         self._end_step(float(correction[2]), step)
 
@@ -130,20 +136,11 @@ class OdometryNoise:
         self._corrected_rad = self._allowed = self._stretch = 0.0
 
 
-def _surprise(
-    axis: NDArray[np.float64],
-    pull: NDArray[np.float64],
-    information: Information,
-    variance: NDArray[np.float64],
-    own: float,
-) -> float:
+def _surprise(pull: float, seen: float, spread: float) -> float:
     """Return the variance along one axis that explains how hard the scan pulls there.
 
-    The pull of a scan at the prediction has the variance H + H Q H: that of the scan's own noise, of the
-    other errors of the prediction (diagonal Q), and of the one asked for, whose present guess `own` is left
-    out.
+    The pull of a scan at the prediction has the variance H + H Q H: that of the scan's own noise, `seen`, of
+    the other errors of the prediction (diagonal Q), `spread`, and of the one asked for, which is left out of
+    them.
     """
-    row = information @ axis
-    seen = float(axis @ row)
-    expected = seen + float(row @ (variance * row)) - own * seen * seen
-    return (float(axis @ pull) ** 2 - expected) / (seen * seen)
+    return (pull**2 - seen - spread) / (seen * seen)

@@ -69,7 +69,8 @@ class Edge:
     @property
     def length_m(self) -> float:
         """Length of the straight line between the ends (thesis: the edge's cost)."""
-        return float(np.hypot(self.T_source_target[0], self.T_source_target[1]))
+        x_m, y_m, _ = self.T_source_target.tolist()
+        return hypot(x_m, y_m)
 
     @property
     def expected_time_s(self) -> float:

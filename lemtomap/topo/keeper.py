@@ -1,7 +1,7 @@
 """Localisation data over a node's life: taken when best known, compared when seen again, renewed if stale."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,7 +86,9 @@ class PlaceKeeper:
                 taken += self._take(node_id, standing, grid, now_s, anyway=self._due.pop(node_id))
         return taken
 
-    def take_all(self, standings: dict[int, NodePoseEstimate], grid: GridView, now_s: float) -> list[Taken]:
+    def take_all(
+        self, standings: Mapping[int, NodePoseEstimate], grid: GridView, now_s: float
+    ) -> list[Taken]:
         """Take what is due now, ripe or not: the drive ends."""
         taken = []
         for node_id, anyway in self._due.items():

@@ -6,6 +6,7 @@ is ever stored: it is the window's view of the graph, gone with the window.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,10 +64,26 @@ class LocalMap:
     def __init__(self, graph: PagedGraph, config: TopoConfig) -> None:
         self._graph = graph
         self._config = config
-        self.standings: dict[int, NodePoseEstimate] = {}
+        self._standings: dict[int, NodePoseEstimate] = {}
+        self._sure: frozenset[int] | None = None
+        """None: a standing has changed since it was asked for."""
         self.reached: dict[int, Reached] = {}
         self.way_m = 0.0
         """Way of the robot so far."""
+
+    @property
+    def standings(self) -> Mapping[int, NodePoseEstimate]:
+        """Where the nodes of the neighbourhood stand; changed by the methods of this class alone."""
+        return self._standings
+
+    def _put(self, node_id: int, standing: NodePoseEstimate) -> None:
+        self._standings[node_id] = standing
+        self._sure = None
+
+    def forget_all(self) -> None:
+        """Begin anew, in another window."""
+        self._standings.clear()
+        self._sure = None
 
     def anchor(
         self,
@@ -78,20 +95,23 @@ class LocalMap:
         seen: Covariance | None = None,
     ) -> None:
         """Set a node's pose as measured in this window; `seen` is the covariance of the measurement alone."""
-        self.standings[node_id] = NodePoseEstimate(
+        standing = NodePoseEstimate(
             T_grid_node, covariance, anchored=True, born=born, measured_m=self.way_m, seen=seen
         )
+        self._put(node_id, standing)
 
     def anchor_found(self, node_id: int, T_grid_node: Pose, covariance: Covariance) -> None:
         """Set a node where it was found in this window, unless it was made there."""
         known = self.standings.get(node_id)
         if known is None or not (known.born and known.anchored):
             self.anchor(node_id, T_grid_node, covariance, seen=covariance)
-            self.standings[node_id] = replace(self.standings[node_id], found=True)
+            self._put(node_id, replace(self._standings[node_id], found=True))
 
     def sure(self) -> frozenset[int]:
         """Return the nodes whose place in the window owes nothing to the graph."""
-        return frozenset(node_id for node_id, standing in self.standings.items() if standing.sure)
+        if self._sure is None:
+            self._sure = frozenset(n for n, standing in self._standings.items() if standing.sure)
+        return self._sure
 
     def doubt(self, node_id: int) -> None:
         """Believe a prediction less: the window did not bear it out.
@@ -103,7 +123,7 @@ class LocalMap:
         place = float(np.trace(standing.covariance[:2, :2])) < 2.0 * config.align_widest_m**2
         heading = float(standing.covariance[2, 2]) < config.align_widest_rad**2
         grown = np.where([place, place, heading], math.sqrt(config.align_widen), 1.0)
-        self.standings[node_id] = replace(standing, covariance=standing.covariance * np.outer(grown, grown))
+        self._put(node_id, replace(standing, covariance=standing.covariance * np.outer(grown, grown)))
 
     def predicted_near(self, T_grid_base: Pose, within_m: float, sigma_m: float) -> int:
         """Return the nearest node that the graph predicts this well and the window does not hold; 0: none."""
@@ -124,7 +144,7 @@ class LocalMap:
         """Let go of all nodes whose poses rest on matches and closures (one of them proved wrong)."""
         for node_id, standing in self.standings.items():
             if not standing.born:
-                self.standings[node_id] = replace(standing, anchored=False)
+                self._put(node_id, replace(standing, anchored=False))
 
     def release_forgotten(self, grid: GridView) -> None:
         """Let go of nodes whose surroundings the window has forgotten."""
@@ -137,7 +157,7 @@ class LocalMap:
                 continue
             x, y, _ = standing.T_grid_node.tolist()
             if not (low_x <= x <= high_x and low_y <= y <= high_y):
-                self.standings[node_id] = replace(standing, anchored=False)
+                self._put(node_id, replace(standing, anchored=False))
 
     def settle(self, associated_id: int) -> None:
         """Find all nodes within the local radius again and place those that are not anchored by the edges.
@@ -162,7 +182,7 @@ class LocalMap:
                     int(reached.via.target_id == from_id),
                 )
                 settled[node_id] = NodePoseEstimate(T_grid_node, covariance, anchored=False)
-        self.standings = self._solved(settled)
+        self._standings, self._sure = self._solved(settled), None
 
     def _is_fresh(self, standing: NodePoseEstimate) -> bool:
         """Return True if a node was measured so lately that the window cannot have drifted away from it."""

@@ -381,7 +381,7 @@ class TopoMapper:
             return
         self._tell(self.keeper.take_all(self.local.standings, now.grid, now.slam.stamp_s))
         self.keeper.forget_window()
-        self.local.standings.clear()
+        self.local.forget_all()
         self._at.last = None
 
     def found(self, *, known: bool = True) -> None:

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.errors import BadLog
-from lemtomap.robot.logs import numbers
 from lemtomap.robot.logs.fans import (
     Fan,
     UnknownFan,
@@ -31,7 +30,7 @@ from lemtomap.robot.logs.fans import (
     fan_told,
 )
 from lemtomap.robot.logs.no_return import infer_no_return_m
-from lemtomap.robot.logs.numbers import BrokenLine
+from lemtomap.robot.logs.numbers import BrokenLine, Fields
 from lemtomap.robot.logs.oddities import note_oddities
 from lemtomap.robot.logs.odometry import OdometryLines
 from lemtomap.robot.logs.records import Laser, Record, RecordedLog
@@ -78,13 +77,13 @@ class _Reader:
         name = _name(line)
         try:
             if name in self.records:
-                self.records[name].append(self._record(name, place, line.split()))
+                self.records[name].append(self._record(name, place, Fields(line)))
             elif name == "ODOM" and self.kind() == RAW:
-                fields = line.split()
-                _refuse_other_length(name, fields, SHORTEST_MESSAGE)
-                self.odometry.add(numbers.stamp(fields[-STAMPS]), numbers.pose(fields[1:4]))
+                fields = Fields(line)
+                _refuse_other_length(name, len(fields), SHORTEST_MESSAGE)
+                self.odometry.add(fields.stamp(SHORTEST_MESSAGE - STAMPS), fields.pose(1))
             elif name == "PARAM":
-                self._set(line.split())
+                self._set(Fields(line))
         except BrokenLine as reason:
             self.remarks.add(BROKEN, place, str(reason))
             self.first_broken = self.first_broken or f":{place}: {reason}"
@@ -103,23 +102,24 @@ class _Reader:
         posed = max(POSED, key=lambda kind: len(self.records[kind]))
         return posed if self.records[posed] else RAW
 
-    def _set(self, fields: list[str]) -> None:
+    def _set(self, fields: Fields) -> None:
         """Keep a setting of the laser."""
-        if len(fields) > 2 and fields[1] in _SETTINGS:
-            self._params[fields[1]] = numbers.number(fields[2], _SETTINGS[fields[1]])
+        if len(fields) > 2 and fields.text(1) in _SETTINGS:
+            name = fields.text(1)
+            self._params[name] = fields.number(2, _SETTINGS[name])
 
-    def _record(self, name: str, place: int, fields: list[str]) -> Record:
+    def _record(self, name: str, place: int, fields: Fields) -> Record:
         beams = self._flaser(fields) if name == "FLASER" else self._laser1(name, fields)
         at = beams.end
         if name == RAW:  # the pose follows when all odometry is known
             robot, T_base_laser = se2.IDENTITY, self._mounting()
         else:
-            laser, robot = numbers.pose(fields[at : at + 3]), numbers.pose(fields[at + 3 : at + POSES])
+            laser, robot = fields.pose(at), fields.pose(at + 3)
             T_base_laser = se2.between(robot, laser)
             at += POSES + (MOTION if name == "ROBOTLASER1" else 0)
         return Record(
             place=place,
-            stamp_s=numbers.stamp(fields[at]),
+            stamp_s=fields.stamp(at),
             ranges_m=beams.ranges_m,
             laser=self._laser(beams),
             T_odom_base=robot,
@@ -127,32 +127,32 @@ class _Reader:
             missing=int(np.isnan(beams.ranges_m).sum()),
         )
 
-    def _flaser(self, fields: list[str]) -> _Beams:
+    def _flaser(self, fields: Fields) -> _Beams:
         """Read the beams of `FLASER n r1 .. rn`."""
-        count = numbers.count(fields[1], 2) if len(fields) > 1 else 2
+        count = fields.count(1, 2) if len(fields) > 1 else 2
         end = 2 + count
-        _refuse_other_length("FLASER", fields, end + POSES + STAMPS)
+        _refuse_other_length("FLASER", len(fields), end + POSES + STAMPS)
         if self.field_of_view_rad is not None:
             fan = fan_over(count, self.field_of_view_rad)
         else:
             told = self._told("laser_front_laser_fov"), self._told("laser_front_laser_resolution")
             fan = fan_told(count, *told)
-        return _Beams(fan, numbers.readings(fields[2:end]).astype(np.float32), math.inf, end)
+        return _Beams(fan, fields.readings(2, end).astype(np.float32), math.inf, end)
 
-    def _laser1(self, name: str, fields: list[str]) -> _Beams:
+    def _laser1(self, name: str, fields: Fields) -> _Beams:
         """Read the beams of `NAME type start fov resolution max_range accuracy remission n r1 .. rn m ..`."""
-        _refuse_other_length(name, fields[:9], 9)
-        start_rad, fov_rad, step_rad, max_range_m = (numbers.number(text, 1e4) for text in fields[2:6])
-        count = numbers.count(fields[8], 2)
+        _refuse_shorter(name, len(fields), 9)
+        start_rad, fov_rad, step_rad, max_range_m = (fields.number(at, 1e4) for at in range(2, 6))
+        count = fields.count(8, 2)
         at = 9 + count
-        _refuse_other_length(name, fields[: at + 1], at + 1)
-        end = at + 1 + numbers.count(fields[at])
-        _refuse_other_length(name, fields, end + STAMPS + (0 if name == RAW else POSES + MOTION))
+        _refuse_shorter(name, len(fields), at + 1)
+        end = at + 1 + fields.count(at)
+        _refuse_other_length(name, len(fields), end + STAMPS + (0 if name == RAW else POSES + MOTION))
         if self.field_of_view_rad is not None:
             fan = fan_over(count, self.field_of_view_rad)
         else:
             fan = _fan_of_line(count, start_rad, fov_rad, step_rad)
-        ranges_m = numbers.readings(fields[9:at]).astype(np.float32)
+        ranges_m = fields.readings(9, at).astype(np.float32)
         return _Beams(fan, ranges_m, max_range_m if max_range_m > 0.0 else math.inf, end)
 
     def _laser(self, beams: _Beams) -> Laser:
@@ -227,6 +227,10 @@ def _fan_of_line(beams: int, start_rad: float, fov_rad: float, step_rad: float) 
         raise BrokenLine(f"{reason}: {ASK}") from None
 
 
-def _refuse_other_length(name: str, fields: list[str], needed: int) -> None:
-    if len(fields) != needed:
-        raise BrokenLine(f"cut in the middle? {name} promises {needed} fields, the line has {len(fields)}")
+def _refuse_other_length(name: str, found: int, needed: int) -> None:
+    if found != needed:
+        raise BrokenLine(f"cut in the middle? {name} promises {needed} fields, the line has {found}")
+
+
+def _refuse_shorter(name: str, found: int, needed: int) -> None:
+    _refuse_other_length(name, min(found, needed), needed)

@@ -1,7 +1,6 @@
 """The reading by which a laser says that a beam did not come back."""
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,17 +19,18 @@ def infer_no_return_m(records: Sequence[Record]) -> float:
     A laser writes a fixed code, its largest reading, for a beam that does not come back. The code shows as
     a pile of equal readings at the top of the log that comes from many directions.
     """
-    scans = [record.ranges_m for record in records]
-    seen = (ranges[~np.isnan(ranges)] for ranges in scans)
-    largest_m = max((float(ranges.max()) for ranges in seen if len(ranges)), default=0.0)
-    counts: Counter[int] = Counter()
-    beams: dict[int, set[int]] = {}
-    for ranges in scans:
-        for beam in np.flatnonzero(ranges >= largest_m - 2.0 * PILE_WIDTH_M):
-            centimetres = round(100.0 * float(ranges[beam]))
-            counts[centimetres] += 1
-            beams.setdefault(centimetres, set()).add(int(beam))
-    pile, _ = counts.most_common(1)[0] if counts else (0, 0)
-    if len(beams.get(pile, ())) < PILE_BEAMS:
+    if not records:
         return math.inf
-    return max(pile / 100.0 - PILE_WIDTH_M / 2.0, 0.0)
+    ranges_m = np.concatenate([record.ranges_m for record in records])
+    largest_m = float(np.fmax.reduce(ranges_m, initial=0.0))
+    top = np.flatnonzero(ranges_m >= largest_m - 2.0 * PILE_WIDTH_M)
+    if not len(top):
+        return math.inf
+    begins = np.cumsum([0, *(len(record.ranges_m) for record in records)])
+    beams = top - begins[np.searchsorted(begins, top, side="right") - 1]
+    centimetres = np.rint(100.0 * ranges_m[top].astype(np.float64)).astype(np.int64)
+    codes, first, counts = np.unique(centimetres, return_index=True, return_counts=True)
+    pile = codes[np.lexsort((first, -counts))[0]]  # of equal piles the one met first
+    if len(np.unique(beams[centimetres == pile])) < PILE_BEAMS:
+        return math.inf
+    return max(float(pile) / 100.0 - PILE_WIDTH_M / 2.0, 0.0)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.robot.logs.clock import tells_time
+from lemtomap.robot.logs.kernels import ranges
 from lemtomap.robot.logs.remarks import Remarks
 from lemtomap.se2 import Pose
 from lemtomap.types import Odometry, Scan
@@ -75,11 +76,9 @@ class RecordedLog:
     def _scan(self, record: Record) -> Scan:
         laser = record.laser
         no_return_m = min(self.no_return_m, laser.no_return_m)
-        ranges_m = np.where(record.ranges_m >= no_return_m, np.float32(np.inf), record.ranges_m)
-        ranges_m[ranges_m <= 0.0] = np.nan
         return Scan(
             stamp_s=record.stamp_s,
-            ranges_m=ranges_m,
+            ranges_m=ranges.told_apart(record.ranges_m, float(np.float32(no_return_m))),
             angle_min_rad=laser.angle_min_rad,
             angle_step_rad=laser.angle_step_rad,
             time_step_s=laser.time_step_s,

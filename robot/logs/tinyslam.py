@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from lemtomap import se2
 from lemtomap.errors import BadLog, BadSetting
-from lemtomap.robot.logs import numbers
-from lemtomap.robot.logs.numbers import BrokenLine
+from lemtomap.robot.logs.numbers import LATEST_S, BrokenLine, Fields
 from lemtomap.robot.logs.oddities import note_oddities
 from lemtomap.robot.logs.records import Laser, Record, RecordedLog
 from lemtomap.robot.logs.remarks import Remarks
@@ -62,8 +61,8 @@ def read(path: Path, lines: Iterable[tuple[int, str]], field_of_view_rad: float 
     """Read every line; those that are broken are skipped and noted. Raises BadLog when no scan is left."""
     if field_of_view_rad is not None:
         raise BadSetting(f"{path}: the laser of a tinySLAM log is known: --field-of-view is for CARMEN logs")
-    pairs = ((place, line.split()) for place, line in lines)
-    rows = ((place, fields) for place, fields in pairs if fields)
+    pairs = ((place, Fields(line)) for place, line in lines)
+    rows = ((place, fields) for place, fields in pairs if len(fields))
     first = list(islice(rows, LINES_TO_JUDGE))
     layout = _layout([len(fields) for _, fields in first])
     rover, remarks, reason = _Rover(layout), Remarks(), ""
@@ -96,15 +95,15 @@ class _Rover:
         self._ticks: tuple[float, float] | None = None
         self._T_odom_base = se2.pose(0.0, 0.0, 0.0)
 
-    def take(self, place: int, fields: list[str]) -> None:
+    def take(self, place: int, fields: Fields) -> None:
         """Read one line; raises BrokenLine, then it changes nothing."""
         first, end = self._layout.first_range, self._layout.fields
         if len(fields) < end:
             raise BrokenLine(f"cut in the middle? {len(fields)} fields of {end}")
-        stamp_s = numbers.number(fields[0], 1e6 * numbers.LATEST_S) / 1e6
-        left = numbers.number(fields[2], MOST_TICKS)
-        right = self._layout.right_sign * numbers.number(fields[3], MOST_TICKS)
-        millimetres = numbers.readings(fields[first:end], LONGEST_MM)
+        stamp_s = fields.number(0, 1e6 * LATEST_S) / 1e6
+        left = fields.number(2, MOST_TICKS)
+        right = self._layout.right_sign * fields.number(3, MOST_TICKS)
+        millimetres = fields.readings(first, end, LONGEST_MM)
         before = self._ticks if self._ticks is not None else (left, right)
         step = _wheel_step(left - before[0], right - before[1])
         self._ticks, self._T_odom_base = (left, right), se2.compose(self._T_odom_base, step)

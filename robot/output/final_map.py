@@ -1,6 +1,7 @@
 """The map as one picture: every node and every scan placed in one frame, for export only.
 
-Nothing in here is used while driving: the map itself knows no such frame.
+Nothing in here is used while driving: the map itself knows no such frame. What solves it is imported only
+then, for it brings sparse matrices with it that a robot has no use for.
 """
 
 from collections.abc import Mapping
@@ -17,8 +18,6 @@ from lemtomap.se2 import (
 )
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.mapper import TopoMapper
-from lemtomap.topo.whole.layout import lay_out, trajectory
-from lemtomap.topo.whole.smooth import smooth
 from lemtomap.types import EdgeType
 
 
@@ -51,6 +50,9 @@ def final_map(mapper: TopoMapper, *, whole_drive: bool = True) -> FinalMap:
 
     `whole_drive`: the map began empty with this drive, so that every scan may be fitted, not only every node.
     """
+    from lemtomap.topo.whole.layout import lay_out, trajectory  # noqa: PLC0415 - as above
+    from lemtomap.topo.whole.smooth import smooth  # noqa: PLC0415 - as above
+
     view = mapper.view()
     if whole_drive:
         smoothed = smooth(mapper.store, mapper.trail)
@@ -92,6 +94,8 @@ def _with_the_rest(store: TopoStore, placed: Mapping[int, Pose]) -> dict[int, Po
     ids = [node.node_id for node in store.nodes()]
     if all(node_id in placed for node_id in ids):
         return everything
+    from lemtomap.topo.whole.layout import lay_out  # noqa: PLC0415 - as above
+
     layout = lay_out(store)
     anchors = {layout.component[node_id]: node_id for node_id in placed if node_id in layout.component}
     for node_id in ids:

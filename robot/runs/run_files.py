@@ -265,6 +265,7 @@ class RunFiles(Onlooker):
                 "mapping": _effort(core.efforts.mapping),
                 "navigation": _effort(core.efforts.navigation),
             },
+            "threads_cpu_s": core.efforts.threads.spent_s(),
             "dropped": core.exchange.dropped(),
             "recorded": {
                 "run.mcap": _written(self._recorded.parts, now_s),

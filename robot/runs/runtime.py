@@ -12,7 +12,6 @@ the last bytes are a stop.
 import asyncio
 import sys
 import threading
-import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
@@ -40,6 +39,8 @@ from lemtomap.robot.output.onlooker import LOOK_PERIOD_S, Onlooker
 from lemtomap.robot.runs.interrupts import on_interrupt
 
 OUTPUT_PERIOD_S = 0.02  # design, section 4
+SHORTEST_NAP_S = 0.001  # a busy machine gives no shorter one
+LONGEST_NAP_S = 0.025  # a packet comes every 20 ms, now and then a little later
 SETTLE_S = 1.0  # after a mission: the last scans, a standing robot
 JOIN_S = 5.0
 SWITCH_S = (
@@ -75,9 +76,7 @@ class Runtime:
         self._base_events: list[KobukiEvent] = []
         self._laser_events: list[HokuyoEvent] = []
         self._lost: list[str] = []
-        self.loop_cpu_s = 0.0
-        """CPU time of the loop thread: both drivers and the base step."""
-        self._cycle_at_s = 0.0
+        self._cycle_due_s = 0.0
         self._cycle_due = False
         self._crash: BaseException | None = None
         self._interrupted = False
@@ -91,14 +90,14 @@ class Runtime:
         switch_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_S)
         threads = [
-            threading.Thread(target=self._guard, args=(work,), name=name, daemon=True)
+            threading.Thread(target=self._guard, args=(name, work), name=name, daemon=True)
             for name, work in (
                 ("mapping", self._map),
                 ("navigation", self._navigate),
                 ("onlooker", self._look),
             )
         ]
-        with on_interrupt(self._interrupt):
+        with on_interrupt(self._interrupt), self.core.efforts.threads.running():
             try:
                 return asyncio.run(self._loop(threads, duration_s))
             finally:
@@ -118,7 +117,10 @@ class Runtime:
     # ---- the loop thread ----
 
     async def _loop(self, threads: list[threading.Thread], duration_s: float) -> Ended:
-        begun_s = time.thread_time()
+        with self.core.efforts.threads.thread("base"):
+            return await self._drive(threads, duration_s)
+
+    async def _drive(self, threads: list[threading.Thread], duration_s: float) -> Ended:
         drivers = [asyncio.create_task(self._kobuki.run()), asyncio.create_task(self._hokuyo.run())]
         output = asyncio.create_task(self._output(duration_s))
         for thread in threads:
@@ -132,7 +134,6 @@ class Runtime:
             for task in (output, *drivers):
                 task.cancel()
             await asyncio.gather(output, *drivers, return_exceptions=True)
-            self.loop_cpu_s = time.thread_time() - begun_s
         self._raise_first(output, *drivers)
         return self._ended()
 
@@ -140,9 +141,10 @@ class Runtime:
         """Command the base: with each packet, and every 20 ms when none comes."""
         end_s = self.clock.now_s() + duration_s
         while not self.stop.is_set() and self.clock.now_s() < end_s:
-            await asyncio.sleep(0.25 * OUTPUT_PERIOD_S)
-            if self.clock.now_s() >= self._cycle_at_s + OUTPUT_PERIOD_S:
-                self._cycle()
+            nap_s = self._cycle_due_s - self.clock.now_s()
+            await asyncio.sleep(min(max(nap_s, SHORTEST_NAP_S), LONGEST_NAP_S))
+            if self.clock.now_s() >= self._cycle_due_s:
+                self._cycle(OUTPUT_PERIOD_S)
             status = self.core.exchange.mission.get()
             if status is not None and status.state.over:
                 end_s = min(end_s, status.stamp_s + SETTLE_S)
@@ -158,7 +160,7 @@ class Runtime:
         """Command the base as soon as the whole packet is taken, before anything else."""
         if not self._cycle_due:
             self._cycle_due = True
-            asyncio.get_running_loop().call_soon(self._cycle)
+            asyncio.get_running_loop().call_soon(self._cycle, LONGEST_NAP_S)
 
     def _on_laser(self, event: AnyEvent) -> None:
         if isinstance(event, PortOpened | PortLost):
@@ -166,9 +168,11 @@ class Runtime:
         else:
             self._laser_events.append(event)  # type: ignore[arg-type]
 
-    def _cycle(self) -> None:
+    def _cycle(self, patience_s: float) -> None:
+        """Run the base once; without a packet it is due again after so long."""
         self._cycle_due = False
-        now_s = self._cycle_at_s = self.clock.now_s()
+        now_s = self.clock.now_s()
+        self._cycle_due_s = now_s + patience_s
         samples = Samples(self._base_events, self._laser_events, self._lost)
         self._base_events, self._laser_events, self._lost = [], [], []
         self.core.take(samples, now_s)
@@ -211,10 +215,11 @@ class Runtime:
 
     # ---- the other threads ----
 
-    def _guard(self, work: Callable[[], None]) -> None:
+    def _guard(self, name: str, work: Callable[[], None]) -> None:
         """Run a thread's work; a crash ends the run."""
         try:
-            work()
+            with self.core.efforts.threads.thread(name):
+                work()
         except BaseException as error:  # noqa: BLE001 -- kept, and raised in the main thread
             self._crash = self._crash or error
             self.core.halt()

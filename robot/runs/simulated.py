@@ -106,7 +106,8 @@ def _drive_fast(options: SimOptions, run: Run) -> None:
 
     try:
         mission = parse_mission(options.mission)
-        with run.until_asked():
+        times = run.core.efforts.threads
+        with run.until_asked(), times.running(), times.thread("robot and simulator"):
             ended = run_lockstep(simulator, run.core, mission, options.duration_s, run.files.raw.put, watch)
         run.end(ended, truth_of(simulator))
     except Stopped as stopped:

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.grid import DEFAULT_SLAM
+from lemtomap.grid.foreground import is_foreground
+from lemtomap.nav.kernels import shapes
 from lemtomap.nav.types import Contact, ContactKind, Goal
 from lemtomap.robot.build import build_core
 from lemtomap.robot.config import RobotConfig
@@ -27,7 +29,7 @@ from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
 from lemtomap.topo.loops.places import LocalSubmap
 from lemtomap.types import Odometry, Scan
 
-STEP_M, TURN_RAD, SCAN_S = 0.25, 0.5, 0.1  # a drive that calls every kernel in few scans
+STEP_M, TURN_RAD, SCAN_S = 0.4, 0.5, 0.1  # a drive that calls every kernel in few scans
 ASIDE_M = 0.7  # of the middle: on its way back the robot makes nodes of its own beside the first ones
 WAY_M = 14.0  # beyond what the first window holds, and the way after which places are measured again
 WALLS = np.array(
@@ -43,7 +45,7 @@ WALLS = np.array(
     ]
 )
 BEAMS, FIRST_RAD = 682, -2.0862138  # a URG-04LX
-LOST_SCANS = 60
+LOST_SCANS = 40
 NAVIGATES_EACH, BUMPED_AT = 4, 20  # scans
 
 
@@ -61,6 +63,8 @@ def warm_up(config: RobotConfig, slam: str = DEFAULT_SLAM) -> None:
                 _live(core, T_world_base, before, SCAN_S * index, navigates=turns, bumped=index == BUMPED_AT)
             core.close()
     _tell_rivals_apart()
+    shapes.eroded(np.ones((3, 3), np.uint8), 1)  # for nodes out of view, which the imagined robot never has
+    is_foreground(np.zeros((3, 2), np.float32))  # for somebody who walks along
     gc.collect()
     gc.freeze()  # what is loaded now stays: a look through all of it for garbage takes tens of milliseconds
 

@@ -125,13 +125,15 @@ def measure_cpu(seconds: float) -> None:
     runtime = real_run(hardware, parse_mission("explore"), seconds, circle=False)
     ended, wall = resource.getrusage(resource.RUSAGE_SELF), time.monotonic() - wall
     told = hardware.end()
-    efforts, loop_s = runtime.core.efforts, runtime.loop_cpu_s
+    efforts = runtime.core.efforts
+    spent_s = efforts.threads.spent_s()
     whole = ended.ru_utime + ended.ru_stime - begun.ru_utime - begun.ru_stime
     parts = {
-        "both drivers": loop_s - efforts.base.cpu_s,
+        "both drivers": spent_s["base"] - efforts.base.cpu_s,
         "odometry, velocity, safety": efforts.base.cpu_s,
         "mapping": efforts.mapping.cpu_s,
         "navigation": efforts.navigation.cpu_s,
+        "viewer and recorder": spent_s["onlooker"],
         "whole program": whole,
     }
     for name, cpu_s in parts.items():

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, between
-from lemtomap.topo.solve import Problem, solve_whole, straightened
+from lemtomap.topo.solve import Problem
+from lemtomap.topo.solve.whole import solve_whole, straightened
 from tools.truth.relations import nearest_stamps
 
 RELATION_SIGMA = np.array([0.01, 0.01, 0.005])  # m, m, rad: as surely as scans can be laid over one another

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
@@ -90,6 +91,32 @@ def surface_normals(hits: Array, normals: Array) -> None:
         if abs(lx * ry - ly * rx) > MOST_OFF_M * chord:
             continue
         normals[i] = (math.atan2(along_y, along_x) + 0.5 * math.pi) % math.pi
+
+
+@njit(nogil=True, cache=True)
+def in_front(hits: Array, gap: float, compact: float) -> Array:
+    """Return bool (N,): which hits, (N, 2) in the order of their beams, belong to things of at most `compact`
+    from end to end in front of what is seen on both sides of them.
+
+    gap: between neighbouring hits, at which one thing ends and another begins.
+    """
+    count = hits.shape[0]
+    front = np.zeros(count, np.bool_)
+    first = 0
+    for i in range(1, count + 1):
+        if i < count and math.hypot(hits[i, 0] - hits[i - 1, 0], hits[i, 1] - hits[i - 1, 1]) <= gap:
+            continue
+        last = i - 1
+        if first > 0 and i < count:
+            extent = math.hypot(hits[last, 0] - hits[first, 0], hits[last, 1] - hits[first, 1])
+            front[first:i] = (
+                extent <= compact
+                and math.hypot(hits[first - 1, 0], hits[first - 1, 1])
+                > math.hypot(hits[first, 0], hits[first, 1])
+                and math.hypot(hits[i, 0], hits[i, 1]) > math.hypot(hits[last, 0], hits[last, 1])
+            )
+        first = i
+    return front
 
 
 @njit(nogil=True, cache=True)

@@ -13,10 +13,10 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from lemtomap.nav.explore.aside import Aside
 from lemtomap.nav.kernels import explore as kernels
+from lemtomap.nav.kernels import shapes
 from lemtomap.nav.motion.costmap import Costs
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import GroundSeen
@@ -146,4 +146,4 @@ def _decoded(told: bytes) -> Picture | None:
 
 def _sure(bits: NDArray[np.uint8], cells: int) -> NDArray[np.uint8]:
     """Return the ground that was seen even if the picture is so many cells off its place."""
-    return ndimage.minimum_filter(bits, size=2 * cells + 1, mode="constant", cval=0)
+    return shapes.eroded(bits, cells)

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 
 from lemtomap import se2
 from lemtomap.kernels.lines import first_on_line
 from lemtomap.nav.config import BodyLimits, CostmapConfig
 from lemtomap.nav.kernels import fields as kernels
+from lemtomap.nav.kernels import shapes
 from lemtomap.nav.types import CostmapView, ObstacleSighting, Points
 from lemtomap.se2 import Pose
 from lemtomap.types import GridView
@@ -67,7 +67,7 @@ class Costs:
         thick_m: seen ground keeps what squares of this side fit into.
         """
         side = max(1, round(thick_m / self.resolution_m))
-        solid = ndimage.binary_opening(self.state != kernels.UNKNOWN, np.ones((side, side), dtype=np.bool_))
+        solid = shapes.opened(self.state != kernels.UNKNOWN, side)
         spokes = (self.state == kernels.FREE) & ~solid
         return replace(self, state=np.where(spokes, np.uint8(kernels.UNKNOWN), self.state))
 

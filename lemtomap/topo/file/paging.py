@@ -1,6 +1,7 @@
 """The part of the map near the robot, in memory; the rest stays on disk until the robot comes near."""
 
 import heapq
+import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from lemtomap.se2 import Pose, compose
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import DirectedEdge, Edge, Node
 
+MICRO = 1e6  # lengths in whole micrometres: equal ways tie, in whatever frame they were measured
 LEGS_PER_NODE = 4  # legs are kept of so many times the nodes: in plain numbers they are small
 
 
@@ -35,8 +37,8 @@ class PagedGraph:
         self._capacity = capacity
         self._nodes: OrderedDict[int, Node] = OrderedDict()
         self._edges: OrderedDict[int, tuple[Edge, ...]] = OrderedDict()
-        self._ways: dict[int, list[tuple[int, float, Edge]]] = {}
-        """Other end, length and edge, of nodes whose edges are in memory and were asked for their ways."""
+        self._ways: dict[int, list[tuple[int, int, Edge]]] = {}
+        """Other end, length (um) and edge, of nodes in memory that were asked for their ways."""
         self._legs: OrderedDict[int, tuple[DirectedEdge, ...]] = OrderedDict()
 
     def node(self, node_id: int) -> Node:
@@ -120,29 +122,28 @@ class PagedGraph:
         Holds: a node's `via` comes from a node earlier in the result.
         """
         reached: dict[int, Reached] = {}
-        queue: list[tuple[float, int, int, Edge | None]] = [(0.0, 0, start_id, None)]
-        best = {start_id: 0.0}
-        pushed = 0
+        queue: list[tuple[int, int, int, Edge | None]] = [(0, 0, start_id, None)]
+        best = {start_id: 0}
+        pushed, radius_um = 0, math.floor(radius_m * MICRO)
+        beyond_um = radius_um + 1
         while queue and len(reached) < limit:
-            distance_m, _, node_id, via = heapq.heappop(queue)
+            distance_um, _, node_id, via = heapq.heappop(queue)
             if node_id in reached:
                 continue
-            reached[node_id] = Reached(node_id, distance_m, via)
-            for other_id, length_m, edge in self._ways_from(node_id):
-                if other_id in reached:
-                    continue
-                further_m = round(distance_m + length_m, 6)  # equal ways tie in every frame
-                if further_m <= radius_m and further_m < best.get(other_id, radius_m + 1.0):
-                    best[other_id] = further_m
+            reached[node_id] = Reached(node_id, distance_um / MICRO, via)
+            for other_id, length_um, edge in self._ways_from(node_id):
+                further_um = distance_um + length_um
+                if further_um < best.get(other_id, beyond_um):
+                    best[other_id] = further_um
                     pushed += 1
-                    heapq.heappush(queue, (further_m, pushed, other_id, edge))
+                    heapq.heappush(queue, (further_um, pushed, other_id, edge))
         return reached
 
-    def _ways_from(self, node_id: int) -> list[tuple[int, float, Edge]]:
+    def _ways_from(self, node_id: int) -> list[tuple[int, int, Edge]]:
         ways = self._ways.get(node_id)
         if ways is None:
             edges = self.edges_of(node_id)
-            ways = [(edge.other(node_id), edge.length_m, edge) for edge in edges]
+            ways = [(edge.other(node_id), round(MICRO * edge.length_m), edge) for edge in edges]
             self._ways[node_id] = ways
         return ways
 

@@ -28,27 +28,42 @@ def nearest_field(
         r = math.floor((targets[k, 1] - low_y) / cell)
         if 0 <= r < size and 0 <= c < size:
             field[r, c] = k
+    # one swept row after the other; a cell whose neighbours on the swept side are empty has nothing to take
+    reach_sq = reach * reach
     for sweep in range(2):
+        dr = -1 if sweep == 0 else 1
         for step in range(size):
             r = step if sweep == 0 else size - 1 - step
+            y = low_y + (r + 0.5) * cell
+            beside = r + dr if 0 <= r + dr < size else -1
             for side in range(2):
+                dc = -1 if side == 0 else 1
+                behind = -1  # what the cell just swept holds
                 for across in range(size):
                     c = across if side == 0 else size - 1 - across
-                    x, y = low_x + (c + 0.5) * cell, low_y + (r + 0.5) * cell
                     best = field[r, c]
-                    best_sq = reach * reach
+                    above = left = right = -1
+                    if beside >= 0:
+                        above = field[beside, c]
+                        left = field[beside, c + dc] if 0 <= c + dc < size else -1
+                        right = field[beside, c - dc] if 0 <= c - dc < size else -1
+                    if above < 0 and behind < 0 and left < 0 and right < 0:
+                        behind = best
+                        continue
+                    if best == above and best == behind and best == left and best == right:
+                        behind = best
+                        continue
+                    x = low_x + (c + 0.5) * cell
+                    best_sq = reach_sq
                     if best >= 0:
                         best_sq = (targets[best, 0] - x) ** 2 + (targets[best, 1] - y) ** 2
-                    dr = -1 if sweep == 0 else 1
-                    dc = -1 if side == 0 else 1
-                    for a, b in ((dr, 0), (0, dc), (dr, dc), (dr, -dc)):
-                        if 0 <= r + a < size and 0 <= c + b < size:
-                            k = field[r + a, c + b]
-                            if k >= 0:
-                                sq = (targets[k, 0] - x) ** 2 + (targets[k, 1] - y) ** 2
-                                if sq < best_sq:
-                                    best, best_sq = k, sq
+                    for k in (above, behind, left, right):
+                        if k >= 0 and k != best:
+                            sq = (targets[k, 0] - x) ** 2 + (targets[k, 1] - y) ** 2
+                            if sq < best_sq:
+                                best, best_sq = k, sq
                     field[r, c] = best
+                    behind = best
     return field
 
 

@@ -17,21 +17,27 @@ def line_normals(
     neighbourhood is (1 a line, 0 round or alone).
     """
     n = points_m.shape[0]
-    order = np.argsort(points_m[:, 0])
-    xs, ys = points_m[order, 0], points_m[order, 1]  # side by side in memory, as they are visited
     result = np.zeros((n, 3))
+    if n == 0:
+        return result
+    # strips as wide as the reach, one after another in `along`: neighbours lie in three short stretches
+    low_x, low_y = points_m[:, 0].min(), points_m[:, 1].min()
+    strip = np.floor((points_m[:, 0] - low_x) / reach_m)
+    length = points_m[:, 1].max() - low_y + 4.0 * reach_m  # no stretch reaches into the next strip
+    along = strip * length + (points_m[:, 1] - low_y)
+    order = np.argsort(along)
+    xs, ys = points_m[order, 0], points_m[order, 1]  # side by side in memory, as they are visited
+    along = along[order]
     reach2 = reach_m * reach_m
     for k in range(n):
         i = order[k]
         x, y = xs[k], ys[k]
         count, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for way in range(2):
-            step = 1 if way == 0 else -1
-            m = k if way == 0 else k - 1
-            while 0 <= m < n:
+        for aside in range(-1, 2):
+            middle = along[k] + aside * length
+            m = np.searchsorted(along, middle - 1.001 * reach_m)
+            while m < n and along[m] <= middle + 1.001 * reach_m:
                 dx, dy = xs[m] - x, ys[m] - y
-                if abs(dx) > reach_m:
-                    break
                 if dx * dx + dy * dy <= reach2:
                     count += 1
                     sx += dx
@@ -39,7 +45,7 @@ def line_normals(
                     sxx += dx * dx
                     sxy += dx * dy
                     syy += dy * dy
-                m += step
+                m += 1
         if count < 3:
             continue
         mx, my = sx / count, sy / count

@@ -17,7 +17,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import networkx as nx
 import numpy as np
 import yaml
 
@@ -171,6 +170,8 @@ def write_g2o(store: TopoStore, path: Path) -> None:
 
 def write_graphml(store: TopoStore, path: Path) -> None:
     """Write the graph with the relative poses on its edges: the one export that needs no absolute pose."""
+    import networkx as nx  # noqa: PLC0415 - half a second that no other format waits for
+
     graph: nx.MultiDiGraph[int] = nx.MultiDiGraph()
     names = _shown_names(store)
     for node in store.nodes():

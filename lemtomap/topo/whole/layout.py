@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from lemtomap.se2 import IDENTITY, Pose, compose
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
-from lemtomap.topo.solve import Problem, Solution, solve_whole
+from lemtomap.topo.solve import Problem, Solution
+from lemtomap.topo.solve.whole import solve_whole
 from lemtomap.topo.whole.trail import ScanTrail
 from lemtomap.types import EdgeType
 

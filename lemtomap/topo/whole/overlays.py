@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from lemtomap.se2 import Pose, between, transform
+from lemtomap.se2 import Pose, between
 from lemtomap.topo.cells import averaged, thinned
 from lemtomap.topo.graph import Covariance, sure_of
 from lemtomap.topo.kernels import fitting, lines
@@ -67,7 +67,9 @@ class Passes:
     """
 
     def __init__(self, track: Pose, looks: Sequence[TrailScan], joined: Callable[[int, int], bool]) -> None:
-        self._looks = looks
+        self._hits_base = np.concatenate([look.hits_base for look in looks] or [np.empty((0, 2), np.float32)])
+        self._first = np.cumsum([0, *(len(look.hits_base) for look in looks)])
+        """Where each look's hits begin."""
         self._are_joined = joined
         self._scans = np.array([look.scan for look in looks], dtype=np.int64)
         way_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track[:, :2], axis=0).T))])
@@ -118,8 +120,12 @@ class Passes:
         """Return the hits of a look and those around it, in the frame of its base."""
         low, high = np.searchsorted(self._way_m, self._way_m[at] + np.array([-span_m, span_m]))
         T_at = between(self._track[at], self._track[low:high])
-        parts = [transform(T_at[k - low], self._looks[k].hits_base.astype(float)) for k in range(low, high)]
-        return np.concatenate(parts)
+        x, y, yaw = np.repeat(T_at, np.diff(self._first[low : high + 1]), axis=0).T
+        hits = self._hits_base[self._first[low] : self._first[high]].astype(float)
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        return np.column_stack(
+            [x + cos * hits[:, 0] - sin * hits[:, 1], y + sin * hits[:, 0] + cos * hits[:, 1]]
+        )
 
     def _try(self, view: "_View", earlier: int, later: int, T_view_look: Pose) -> None:
         points = thinned(self._joined(later, LOOK_SPAN_M), THIN_M)

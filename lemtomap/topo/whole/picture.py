@@ -1,26 +1,20 @@
 """A picture of the whole map for a person: nodes, edges by type, names."""
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from lemtomap.errors import BadInput
-from lemtomap.se2 import Pose
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
 from lemtomap.topo.naming import shown
 from lemtomap.topo.whole.export import APPROXIMATE, write_whole
 from lemtomap.topo.whole.layout import lay_out
+from lemtomap.topo.whole.lettering import plain_text, write_name
 from lemtomap.types import EdgeType
 
 COLOURS = {
@@ -30,22 +24,6 @@ COLOURS = {
 }
 CLOSED, UNPROVEN = "#14213d", "#d1495b"
 MAX_INCHES = 16.0
-LABEL = 40  # characters of a name in a picture
-
-
-@contextmanager
-def plain_text() -> Iterator[None]:
-    """Draw every text as it stands: a name is no formula, a letter that the font lacks is a box."""
-    with rc_context({"text.parse_math": False}), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
-        yield
-
-
-def write_name(axes: Axes, name: str, place: Pose, **how: Any) -> None:
-    """Write a name beside a place, float64 (2+,). However long, the rest of the picture keeps its size."""
-    at = (float(place[0]), float(place[1]))
-    label = axes.annotate(shown(name, LABEL), at, textcoords="offset points", **how)
-    label.set_in_layout(False)
 
 
 def write_png(store: TopoStore, path: Path, dots_per_inch: int = 110) -> None:

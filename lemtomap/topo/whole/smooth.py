@@ -24,7 +24,8 @@ from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Covariance, Edge
 from lemtomap.topo.kernels import poses as kernels
-from lemtomap.topo.solve import Problem, solve_whole, straightened
+from lemtomap.topo.solve import Problem
+from lemtomap.topo.solve.whole import solve_whole, straightened
 from lemtomap.topo.whole.overlays import Overlay, Passes
 from lemtomap.topo.whole.trail import ScanTrail
 from lemtomap.types import EdgeType

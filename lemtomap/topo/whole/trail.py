@@ -7,7 +7,7 @@ import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Self
+from typing import BinaryIO, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,17 @@ class _LookFile:
         self._file.close()
 
 
+class _Columns(NamedTuple):
+    """The fields of the records in the buffer: looked up once, not at every scan."""
+
+    stamp_s: NDArray[np.float64]
+    node_id: NDArray[np.int64]
+    T_node_base: NDArray[np.float64]
+    T_grid_base: NDArray[np.float64]
+    step: NDArray[np.float32]
+    tie: NDArray[np.float32]
+
+
 class ScanTrail:
     """Append-only file of (stamp, node, T_node_base), one record for each scan. Not part of the map."""
 
@@ -82,6 +93,7 @@ class ScanTrail:
         self._file = file
         weakref.finalize(self, file.close)
         self._buffer = np.zeros(_BUFFERED, RECORD)
+        self._columns = _Columns(*(self._buffer[name] for name in _Columns._fields))
         self._filled = 0
         self.count = 0
         self._looks = _LookFile()
@@ -109,10 +121,10 @@ class ScanTrail:
         """
         if hits_base is not None and len(hits_base) and slam.matched:
             self._looks.offer(self.count, slam.T_grid_base, hits_base)
-        record = self._buffer[self._filled]
-        record["stamp_s"], record["node_id"], record["T_node_base"] = slam.stamp_s, node_id, T_node_base
-        record["T_grid_base"], record["step"] = slam.T_grid_base, slam.step_covariance
-        record["tie"] = np.nan if tie is None else tie
+        at, columns = self._filled, self._columns
+        columns.stamp_s[at], columns.node_id[at], columns.T_node_base[at] = slam.stamp_s, node_id, T_node_base
+        columns.T_grid_base[at], columns.step[at] = slam.T_grid_base, slam.step_covariance
+        columns.tie[at] = np.nan if tie is None else tie
         self._filled += 1
         self.count += 1
         if self._filled == _BUFFERED:

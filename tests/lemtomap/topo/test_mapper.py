@@ -150,8 +150,9 @@ def test_the_nearest_node_that_is_surely_predicted_is_looked_for_in_the_window(t
             [(0.5, 0.01, True), (1.0, 0.5, False), (2.0, 0.1, False), (2.5, 0.01, False)], start=1
         ):
             covariance = np.eye(3) * sigma_m**2
-            local.standings[node_id] = NodePoseEstimate(
-                np.array([x_m, 0.0, 0.0]), covariance, anchored=anchored
+            local._put(
+                node_id,
+                NodePoseEstimate(np.array([x_m, 0.0, 0.0]), covariance, anchored=anchored),
             )
         assert local.predicted_near(np.zeros(3), 3.0, 0.2) == 3
         assert local.predicted_near(np.zeros(3), 1.9, 0.2) == 0
@@ -161,9 +162,24 @@ def test_a_refused_place_is_doubted_no_further_than_a_match_may_look():
     """What follows along the edges swung about by 16 degrees after a hall in which no place was matched."""
     config = TopoConfig()
     local = LocalMap(None, config)
-    local.standings[1] = NodePoseEstimate(pose(0, 0, 0), np.diag([1e-4, 1e-4, 1e-4]), anchored=False)
+    local._put(1, NodePoseEstimate(pose(0, 0, 0), np.diag([1e-4, 1e-4, 1e-4]), anchored=False))
     for _ in range(40):
         local.doubt(1)
     sigmas = np.sqrt(np.diag(local.standings[1].covariance))
     assert np.all(sigmas[:2] > config.align_widest_m)
     assert np.all(sigmas < 2.0 * np.array([config.align_widest_m] * 2 + [config.align_widest_rad]))
+
+
+def test_what_is_sure_in_the_window_follows_every_change_of_a_standing(tmp_path):
+    with TopoStore.create(tmp_path / "map.lemto") as store:
+        local = LocalMap(PagedGraph(store), TopoConfig())
+        tight = np.eye(3) * 1e-4
+        local.anchor(1, np.zeros(3), tight, born=True)
+        local.anchor(2, np.ones(3), tight)
+        assert local.sure() == {1}
+        local.anchor_found(2, np.ones(3), tight)
+        assert local.sure() == {1, 2}
+        local.release_matched()
+        assert local.sure() == {1}
+        local.forget_all()
+        assert local.sure() == set()

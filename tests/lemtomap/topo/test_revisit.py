@@ -91,9 +91,9 @@ def revisit(tmp_path_factory):
     for (
         node_id,
         standing,
-    ) in mapper.local.standings.items():  # it drifted little by little: all near came along
+    ) in list(mapper.local.standings.items()):  # it drifted little by little: all near came along
         moved = compose(world.T_grid_world, truth[node_id])
-        mapper.local.standings[node_id] = replace(standing, T_grid_node=moved)
+        mapper.local._put(node_id, replace(standing, T_grid_node=moved))
     errors, right, measured = [], [], []
 
     def visit(at):

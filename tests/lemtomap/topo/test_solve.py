@@ -7,7 +7,8 @@ import pytest
 
 from lemtomap.se2 import between, compose
 from lemtomap.topo.kernels import solve as kernels
-from lemtomap.topo.solve import Problem, solve_local, solve_whole
+from lemtomap.topo.solve import Problem, solve_local
+from lemtomap.topo.solve.whole import solve_whole
 
 GRAPHS = Path(__file__).parents[4] / "shared" / "data" / "posegraph"
 

@@ -10,6 +10,7 @@ from lemtomap import se2
 from lemtomap.robot.cli.main import main
 from lemtomap.robot.missions.missions import parse_mission
 from lemtomap.robot.missions.places import check_places
+from lemtomap.robot.output import overview as overview_module
 from lemtomap.robot.output.overview import Overview, draw
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
@@ -170,10 +171,9 @@ assert not {{"numba", "lemtomap.robot.runs.runtime", "matplotlib"}} & set(sys.mo
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)  # noqa: S603
 
 
-@pytest.mark.parametrize("name", [r"lab $\foo$", "$", "\u53a8\u623f", "\x1b[31m\x00", "long" * 1000])
-def test_the_picture_of_a_run_is_drawn_whatever_its_places_and_its_folder_are_called(tmp_path, name):
+def overview_of(name):
     grid = GridView(0.0, np.zeros((40, 40), np.int8), 0.05, (0.0, 0.0))
-    overview = Overview(
+    return Overview(
         T_map_node={1: np.zeros(3), 2: np.array([1.0, 0.5, 0.0])},
         edges=[(1, 2, EdgeType.ODOMETRY)],
         trajectory=np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.0]]),
@@ -184,5 +184,24 @@ def test_the_picture_of_a_run_is_drawn_whatever_its_places_and_its_folder_are_ca
         title=f"run: goto:{name}",
         facts=[f"mission  goto:{name}"],
     )
-    draw(tmp_path / "overview.png", overview)
+
+
+@pytest.mark.parametrize("name", [r"lab $\foo$", "$", "\u53a8\u623f", "\x1b[31m\x00", "long" * 1000])
+def test_the_picture_of_a_run_is_drawn_whatever_its_places_and_its_folder_are_called(tmp_path, name):
+    draw(tmp_path / "overview.png", overview_of(name))
     assert (tmp_path / "overview.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("painter", "reason"),
+    [("raise SystemExit('no room left for colours')", "no room left"), ("import os; os.abort()", "-6")],
+)
+def test_a_painter_that_fails_is_told_in_a_line_and_the_old_picture_stays(
+    tmp_path, monkeypatch, painter, reason
+):
+    (tmp_path / "overview.png").write_bytes(b"old")
+    monkeypatch.setattr(overview_module, "python", lambda *_: [sys.executable, "-c", painter])
+    with pytest.raises(OSError, match=reason):
+        draw(tmp_path / "overview.png", overview_of("kitchen"))
+    assert [path.name for path in tmp_path.iterdir()] == ["overview.png"]
+    assert (tmp_path / "overview.png").read_bytes() == b"old"

@@ -1,0 +1,1 @@
+"""Flat loops over the bytes of a log."""
