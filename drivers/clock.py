@@ -11,6 +11,8 @@ import itertools
 from collections import deque
 from dataclasses import dataclass
 
+TICK_S = 1e-3  # both devices count milliseconds
+
 
 @dataclass(frozen=True, slots=True)
 class ClockConfig:
@@ -18,7 +20,6 @@ class ClockConfig:
 
     bits: int
     """Width of the device's stamp; it wraps at 2**bits."""
-    tick_s: float = 1e-3  # both devices count milliseconds
     latency_s: float = 0.0
     """Least time from stamp to arrival, when no two-way exchange measured it."""
     bin_s: float = 1.0  # holds a packet with almost no extra delay even through 16 ms bursts
@@ -76,7 +77,7 @@ class DeviceClock:
     @property
     def offset_s(self) -> float:
         """Host time minus unwrapped device time at the last stamp."""
-        return self._line(self._ticks * self._config.tick_s) - self._latency_s
+        return self._line(self._ticks * TICK_S) - self._latency_s
 
     def anchor(self, raw: int, offset_s: float, now_s: float) -> None:
         """Begin an epoch with the true offset (host minus device time, stamp `raw` unwrapped as it is).
@@ -85,7 +86,7 @@ class DeviceClock:
         """
         self.restart()
         self._raw, self._ticks, self._arrival_s = raw % self._period, raw, now_s
-        self._offset_s = offset_s - self._drift * raw * self._config.tick_s
+        self._offset_s = offset_s - self._drift * raw * TICK_S
         self._latency_s = 0.0
         self._bin_end_s = now_s + self._config.bin_s
         self._learn_until_s = now_s + self._config.learn_s
@@ -99,7 +100,7 @@ class DeviceClock:
         """Begin an epoch with a row of stamps that arrived together: only the latest is fresh."""
         latest = first_raw + (latest_raw - first_raw) % self._period
         self._raw, self._ticks, self._arrival_s = (first_raw - 1) % self._period, first_raw - 1, arrival_s
-        self._offset_s = arrival_s - latest * self._config.tick_s * (1.0 + self._drift)
+        self._offset_s = arrival_s - latest * TICK_S * (1.0 + self._drift)
         self._bin_end_s = arrival_s + self._config.bin_s
 
     def map(self, raw: int, arrival_s: float) -> float | None:
@@ -120,27 +121,27 @@ class DeviceClock:
             ticks = raw
         self._strike_count = 0
         self._raw, self._ticks, self._arrival_s = raw, ticks, arrival_s
-        device_s = ticks * self._config.tick_s
+        device_s = ticks * TICK_S
         self._observe(device_s, arrival_s)
         return self._growing(device_s)
 
     def _unwrap(self, raw: int, arrival_s: float) -> int:
         step = (raw - self._raw) % self._period
-        expected = (arrival_s - self._arrival_s) / self._config.tick_s
+        expected = (arrival_s - self._arrival_s) / TICK_S
         return self._ticks + step + self._period * round((expected - step) / self._period)
 
     def _line(self, device_s: float) -> float:
         return self._offset_s + self._drift * device_s
 
     def _plausible(self, ticks: int, arrival_s: float) -> bool:
-        device_s = ticks * self._config.tick_s
+        device_s = ticks * TICK_S
         late_s = arrival_s - device_s - self._line(device_s)
         return ticks > self._ticks and -self._config.early_s <= late_s <= self._config.late_s
 
     def _new_epoch(self, raw: int, arrival_s: float) -> bool:
         """Count stamps that fit one another but not the line; tell whether they are enough."""
         last_raw, last_arrival_s = self._strike
-        step_s = ((raw - last_raw) % self._period) * self._config.tick_s
+        step_s = ((raw - last_raw) % self._period) * TICK_S
         fits = step_s > 0.0 and abs(step_s - (arrival_s - last_arrival_s)) < 2.0 * self._config.early_s
         self._strike_count = self._strike_count + 1 if fits else 1
         self._strike = (raw, arrival_s)
@@ -168,7 +169,7 @@ class DeviceClock:
         if self._learn_until_s is None:
             self._fit()
         elif arrival_s >= self._learn_until_s:
-            device_s = self._ticks * self._config.tick_s
+            device_s = self._ticks * TICK_S
             true_s = self._line(device_s)
             self._fit()
             self._latency_s = self._line(device_s) - true_s

@@ -23,6 +23,7 @@ _HOMES = {
     "Mapper": "lemtomap.pipeline",
     "Navigator": "lemtomap.nav.navigator",
     "NoRoute": "lemtomap.errors",
+    "NotStarted": "lemtomap.errors",
     "Odometry": "lemtomap.types",
     "Scan": "lemtomap.types",
     "Twist": "lemtomap.types",

@@ -5,6 +5,7 @@ from lemtomap.errors import BadSample as BadSample
 from lemtomap.errors import BadSetting as BadSetting
 from lemtomap.errors import LemtomapError as LemtomapError
 from lemtomap.errors import NoRoute as NoRoute
+from lemtomap.errors import NotStarted as NotStarted
 from lemtomap.nav.navigator import Navigator as Navigator
 from lemtomap.nav.types import Goal as Goal
 from lemtomap.pipeline import Mapper as Mapper

@@ -4,8 +4,9 @@ LemtomapError
 ├── BadInput      a file or a setting is unusable: tell the user its name, the place and the reason
 │   ├── BadLog       a recorded log
 │   ├── BadMap       a map file: foreign, truncated, of a newer schema
-│   ├── BadSample    a scan or an odometry that is none: its numbers are of another kind or shape
+│   ├── BadSample    an argument that is none: its numbers are of another kind or shape
 │   └── BadSetting   a configuration that cannot work
+├── NotStarted    something was asked for that is there from the first scan on
 └── NoRoute       the goal cannot be reached: report, take the next goal
 """
 
@@ -27,11 +28,22 @@ class BadMap(BadInput):
 
 
 class BadSample(BadInput):
-    """A scan or an odometry cannot be used; the text names the argument, and its shape or value."""
+    """A scan, a pose or another argument cannot be used; the text names it, and its shape or value."""
 
 
 class BadSetting(BadInput):
-    """A setting cannot work; the text names it and its limits."""
+    """A setting cannot work; the text names it and its limits.
+
+    names: the fields it is about, where they are known; any of them may be the one to change.
+    """
+
+    def __init__(self, text: str, *names: str) -> None:
+        super().__init__(text)
+        self.names = names
+
+
+class NotStarted(LemtomapError):
+    """A snapshot was asked for before the first scan."""
 
 
 class NoRoute(LemtomapError):

@@ -18,29 +18,6 @@ from lemtomap.types import Odometry
 
 
 @dataclass(frozen=True, slots=True)
-class MotionNoise:
-    """How fast odometry's covariance grows. Defaults: tools/odometry_noise over 12 simulated robots."""
-
-    along_m_per_m: float = within(0.007, 1e-4, 0.5)
-    """Standard deviation along the path for each metre: a wheel's radius is wrong everywhere alike."""
-    along_m_per_sqrt_m: float = within(0.0065, 1e-5, 0.5)
-    """The same of slip, which forgets itself: grows with the square root of the distance."""
-    across_m_per_sqrt_m: float = within(0.004, 1e-5, 0.5)
-    yaw_rad_per_rad: float = within(0.007, 1e-4, 0.5)
-    """The gyro's scale."""
-    yaw_rad_per_sqrt_s: float = within(0.0005, 1e-6, 0.1)
-    """The gyro's wander, standing or not: 0.03 deg/s per root Hz (data sheet)."""
-
-    def covariance(self, distance_m: float, turn_rad: float, elapsed_s: float) -> NDArray[np.float64]:
-        """Return float64 (3, 3) of a nearly straight motion: along and across it in m, yaw in rad."""
-        d = abs(distance_m)
-        yaw = (self.yaw_rad_per_rad * turn_rad) ** 2 + self.yaw_rad_per_sqrt_s**2 * max(0.0, elapsed_s)
-        along = (self.along_m_per_m * d) ** 2 + self.along_m_per_sqrt_m**2 * d
-        across = self.across_m_per_sqrt_m**2 * d + yaw * d * d / 3.0  # heading wanders while driving
-        return np.array([[along, 0.0, 0.0], [0.0, across, yaw * d / 2.0], [0.0, yaw * d / 2.0, yaw]])
-
-
-@dataclass(frozen=True, slots=True)
 class OdometryConfig:
     """Geometry of the base, and when it stands still."""
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.displacement import Watch
-from lemtomap.errors import BadSample
 from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam, SlamConfig
+from lemtomap.samples import as_finite, as_points, as_whole, check_kind
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import LevelChanged, NavEvent
 from lemtomap.topo.file.store import TopoStore
@@ -75,9 +75,15 @@ class Mapper:
     ) -> Self:
         """Map into a file with the default window SLAM: a new one, or a map to go on with.
 
-        In a map to go on with the robot may stand anywhere; it is `lost` until it recognises a place. Raises
-        BadMap, BadSetting.
+        In a map to go on with the robot may stand anywhere; it is `lost` until it recognises a place. `seed`:
+        of all that is random; the same samples and seed make the same map. Raises BadMap, and BadSample for
+        arguments that are none.
         """
+        check_kind("Mapper.open: path", path, str, Path)
+        as_whole("Mapper.open: seed", seed)
+        check_kind("Mapper.open: slam", slam, SlamConfig, type(None))
+        check_kind("Mapper.open: topo", topo, TopoConfig, type(None))
+        check_kind("Mapper.open: loops", loops, LoopConfig, type(None))
         known = Path(path).exists()
         store = (TopoStore.open if known else TopoStore.create)(path)
         make_slam = partial(SLAMS[DEFAULT_SLAM], slam or SlamConfig(), seed)
@@ -104,10 +110,12 @@ class Mapper:
         hits_base: the scan's hits, float (N, 2), metres, base frame at its stamp, from whoever knows the
         odometry at each beam; None: de-skewed by the velocity, as for the window.
         lifted: the wheels hang in the air; events: what navigation found out since the scan before.
-        Raises BadSample when the pose of the odometry is no number.
+        Raises BadSample for what is no scan, no odometry or no points, and a pose that is not finite.
         """
-        if not np.isfinite(odometry.T_odom_base).all():
-            raise BadSample(f"Odometry.T_odom_base: must be finite, is {odometry.T_odom_base.tolist()}")
+        check_kind("Mapper.update: scan", scan, Scan)
+        check_kind("Mapper.update: odometry", odometry, Odometry)
+        hits_given = None if hits_base is None else as_points("Mapper.update: hits_base", hits_base)
+        as_finite("Odometry.T_odom_base", odometry.T_odom_base)
         if lifted:  # nothing is mapped there
             self._watch.lift(scan.stamp_s)
             self._disown()
@@ -118,7 +126,7 @@ class Mapper:
         for event in events:
             self._apply(event)
         slam = self._slam.update(scan, odometry)
-        hits = self._slam.points_base() if hits_base is None else hits_base
+        hits = self._slam.points_base() if hits_given is None else hits_given
         moved = self._watch.displaced(slam, odometry, hits) if self._is_watched else ""
         if moved:  # this scan may show both places: the new window begins with the next
             self.lose()

@@ -9,7 +9,8 @@ a range of its own may be a tenth of its default, ten times as much, or what lie
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from itertools import pairwise
+from typing import Any, NoReturn, TypeVar
 
 from lemtomap.errors import BadSetting
 
@@ -41,11 +42,15 @@ def within(default: T, low: float, high: float, why: str = "") -> T:
     return declared
 
 
-def range_of(declared: "dataclasses.Field[Any]") -> Range | None:
-    """Return the range of a field; None when it has none, for it is no number."""
+def range_of(declared: "dataclasses.Field[Any]", default: Any = None) -> Range | None:
+    """Return the range of a field; None when it has none, for it is no number.
+
+    default: where the table holds another than its dataclass says.
+    """
     found: Range | None = declared.metadata.get(_KEY)
-    if found is None and isinstance(declared.default, int | float) and not isinstance(declared.default, bool):
-        return _tenfold(declared.default)
+    usual = declared.default if default is None else default
+    if found is None and isinstance(usual, int | float) and not isinstance(usual, bool):
+        return _tenfold(usual)
     return found
 
 
@@ -60,7 +65,7 @@ def check_ranges(settings: Any) -> None:
     """Refuse a dataclass with a number outside its range, however it was made. Raises BadSetting."""
     for name, value, allowed in _numbers(settings):
         if value not in allowed:
-            raise BadSetting(f"{name} = {value}: must lie {allowed}")
+            refuse(f"must lie {allowed}", **{name: value})
 
 
 def _numbers(settings: Any) -> Iterator[tuple[str, float, Range]]:
@@ -68,3 +73,17 @@ def _numbers(settings: Any) -> Iterator[tuple[str, float, Range]]:
         allowed, value = range_of(declared), getattr(settings, declared.name)
         if allowed is not None and value is not None:
             yield declared.name, value, allowed
+
+
+def refuse(rule: str, **values: Any) -> NoReturn:
+    """Refuse these settings of a dataclass: raise BadSetting that names each with its value, and the rule."""
+    told = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+    raise BadSetting(f"{told}: {rule}", *values)
+
+
+def check_order(settings: Any, *names: str) -> None:
+    """Refuse settings of which one is above the one named after it. Raises BadSetting."""
+    for lower, upper in pairwise(names):
+        low, high = getattr(settings, lower), getattr(settings, upper)
+        if low > high:
+            refuse(f"{lower} must not be above {upper}", **{lower: low, upper: high})

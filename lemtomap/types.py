@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.samples import as_pose, as_row
+from lemtomap.samples import as_number, as_pose, as_row
 from lemtomap.se2 import Pose
 
 
@@ -22,12 +22,18 @@ class Odometry:
     """Where the wheels (and gyro) say the base is. Lists and tuples will do; raises BadSample."""
 
     stamp_s: float
+    """Any clock that runs on evenly, the scans' too."""
     T_odom_base: Pose
-    """float64 (3,): x m, y m, yaw rad."""
+    """float64 (3,): x m, y m, yaw rad; frame odom: continuous, drifts."""
     v_mps: float = 0.0
+    """Speed forwards, base frame."""
     w_radps: float = 0.0
+    """Speed of turning, positive to the left."""
 
     def __post_init__(self) -> None:
+        as_number("Odometry.stamp_s", self.stamp_s, "seconds")
+        as_number("Odometry.v_mps", self.v_mps, "metres per second")
+        as_number("Odometry.w_radps", self.w_radps, "radians per second")
         object.__setattr__(self, "T_odom_base", as_pose("Odometry.T_odom_base", self.T_odom_base))
 
 
@@ -41,18 +47,30 @@ class Scan:
     stamp_s: float
     """Time of the first beam."""
     ranges_m: NDArray[np.float32]
-    """float32 (N,), REP-117: NaN invalid, +inf nothing seen."""
+    """float32 (N,), REP-117: NaN invalid, +inf nothing seen; what lies below range_min_m or beyond
+    range_max_m says nothing."""
     angle_min_rad: float
+    """Direction of the first beam, laser frame: 0 straight on, positive to the left."""
     angle_step_rad: float
+    """From beam to beam; negative where they turn clockwise."""
     time_step_s: float = 0.0
+    """From beam to beam; 0: all at once."""
     range_min_m: float = 0.02
     range_max_m: float = 5.6
     silent_free_m: float = math.inf
     """A beam that saw nothing (+inf) proves free space only so far: a URG-04LX overlooks dark and slanting
     surfaces much nearer than its range."""
     T_base_laser: Pose = field(default_factory=lambda: np.zeros(3))
+    """float64 (3,): x m, y m, yaw rad, where the laser stands in the base frame."""
 
     def __post_init__(self) -> None:
+        as_number("Scan.stamp_s", self.stamp_s, "seconds")
+        as_number("Scan.angle_min_rad", self.angle_min_rad, "radians")
+        as_number("Scan.angle_step_rad", self.angle_step_rad, "radians")
+        as_number("Scan.time_step_s", self.time_step_s, "seconds", 0.0)
+        least_m = as_number("Scan.range_min_m", self.range_min_m, "metres", 0.0)
+        as_number("Scan.range_max_m", self.range_max_m, "metres", least_m)
+        as_number("Scan.silent_free_m", self.silent_free_m, "metres", 0.0, endless=True)
         object.__setattr__(self, "ranges_m", as_row("Scan.ranges_m", self.ranges_m, np.float32))
         object.__setattr__(self, "T_base_laser", as_pose("Scan.T_base_laser", self.T_base_laser))
 

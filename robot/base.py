@@ -73,14 +73,13 @@ class BaseStep:
     def __init__(self, config: RobotConfig, exchange: Exchange) -> None:
         self.gate = SafetyGate(config.safety)
         self._exchange = exchange
-        self._T_base_laser: Pose = np.array([config.laser.x_m, config.laser.y_m, config.laser.yaw_rad])
+        self._laser = config.laser
         self._odometry = WheelGyroOdometry(config.odometry)
         self._buffer = OdometryBuffer()
         self._mux, self._smoother = VelocityMux(), VelocitySmoother(config.smoother)
         self._retreat, self._indicators = Retreat(config.retreat), Indicators()
         self._watchdog = Watchdog(exchange)
         self._docking_config = config.docking
-        self._upside_down = config.laser.is_upside_down
         self._docking: Docking | None = None
         self._sample: KobukiSample | None = None
         self._last: Odometry | None = None
@@ -171,8 +170,9 @@ class BaseStep:
 
     def _match_scans(self, now_s: float) -> None:
         """Give each scan its motion as soon as odometry covers its last beam."""
+        T_base_laser = self._laser.T_base_laser
         while self._waiting:
-            scan = bridge.scan_of(self._waiting[0], self._T_base_laser, upside_down=self._upside_down)
+            scan = bridge.scan_of(self._waiting[0], T_base_laser, upside_down=self._laser.is_upside_down)
             stamps_s = scan.stamp_s + scan.time_step_s * np.arange(len(scan.ranges_m))
             if self._last is None or self._last.stamp_s < stamps_s[-1]:
                 if now_s - self._waiting[0].arrival_s <= SCAN_PATIENCE_S:

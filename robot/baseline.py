@@ -21,9 +21,8 @@ from lemtomap.types import GridView
 class AmclStep:
     """Stands where the mapping part stands: localises on a map that does not change."""
 
-    def __init__(self, grid: GridView, T_grid_base: Pose, exchange: Exchange, seed: int) -> None:
-        self._grid, self._exchange = grid, exchange
-        self._amcl = Amcl(grid, T_grid_base, seed=seed)
+    def __init__(self, amcl: Amcl, grid: GridView, exchange: Exchange) -> None:
+        self._amcl, self._grid, self._exchange = amcl, grid, exchange
 
     def step(self, timed: TimedScan) -> None:
         """Localise with one scan and publish the grid with the pose in it."""
@@ -42,7 +41,8 @@ def build_metric_core(
     """Return a robot that starts at a known place of a saved grid."""
     exchange = Exchange()
     navigator = Navigator(config.nav, lambda surroundings: WholeGridLook(surroundings, config.nav))
-    localising = AmclStep(grid, np.asarray(T_grid_base, dtype=np.float64), exchange, seed)
+    amcl = Amcl(grid, np.asarray(T_grid_base, dtype=np.float64), config.amcl, seed)
+    localising = AmclStep(amcl, grid, exchange)
     navigation = NavigationStep(navigator, exchange, GridGraph)
     mapping = cast("MappingStep", localising)  # as far as the core is concerned
-    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)
+    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation, config.devices)

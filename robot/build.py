@@ -28,6 +28,15 @@ def build_slam(name: str, config: RobotConfig, seed: int) -> GridSlam:
     return maker(config.slam, seed)
 
 
+def build_topo(slam: str, config: RobotConfig, store: TopoStore) -> TopoMapper:
+    """Return the topological half of the mapper over a window SLAM of this name.
+
+    The growing grid closes its own loops and is far too large to search.
+    """
+    recogniser = None if slam == "gmapping" else LoopRecogniser(config.loops)
+    return TopoMapper(config.topo, store, recogniser=recogniser)
+
+
 def build_core(
     config: RobotConfig, map_path: Path, *, slam: str = DEFAULT_SLAM, seed: int = 0, durable: bool = True
 ) -> RobotCore:
@@ -38,12 +47,9 @@ def build_core(
         map_path, durable=durable and config.topo.durable, commit_every_s=config.topo.commit_every_s
     )
     if known:
-        prune(store)
-    recogniser = (
-        None if slam == "gmapping" else LoopRecogniser(config.loops)
-    )  # a growing grid is too large to search
-    topo = TopoMapper(config.topo, store, recogniser=recogniser)
+        prune(store, config.prune)
+    topo = build_topo(slam, config, store)
     mapping = MappingStep(Mapper(lambda: build_slam(slam, config, seed), topo), exchange)
     reader = partial(TopoReader, map_path, is_checked=True)
     navigation = NavigationStep(Navigator(config.nav), exchange, reader)
-    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation)
+    return RobotCore(exchange, BaseStep(config, exchange), mapping, navigation, config.devices)

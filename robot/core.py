@@ -13,6 +13,7 @@ from typing import TypeVar
 from lemtomap.drivers.hokuyo.session import HokuyoEvent
 from lemtomap.drivers.kobuki.session import KobukiEvent
 from lemtomap.robot.base import BaseStep, Commands
+from lemtomap.robot.config import DevicesConfig
 from lemtomap.robot.exchange import Exchange, TimedScan
 from lemtomap.robot.mapping import MappingStep
 from lemtomap.robot.navigating import NavigationStep
@@ -53,9 +54,16 @@ class RobotCore:
     """The robot between its drivers and its user."""
 
     def __init__(
-        self, exchange: Exchange, base: BaseStep, mapping: MappingStep, navigation: NavigationStep
+        self,
+        exchange: Exchange,
+        base: BaseStep,
+        mapping: MappingStep,
+        navigation: NavigationStep,
+        devices: DevicesConfig | None = None,
     ) -> None:
         self.exchange = exchange
+        self.devices = devices or DevicesConfig()
+        """How whoever brings the samples talks to the devices."""
         self.base, self.mapping, self.navigation = base, mapping, navigation
         self.efforts = Efforts()
         self._navigate_at_s = 0.0

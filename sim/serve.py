@@ -22,8 +22,10 @@ from typing import TextIO
 from lemtomap.sim import worlds
 from lemtomap.sim.errors import SimError, Unplugged
 from lemtomap.sim.link import HostPort
+from lemtomap.sim.mounting import Mounting
 from lemtomap.sim.pty_port import PtyPort
 from lemtomap.sim.simulator import STEP_S, Simulator
+from lemtomap.sim.world import Pose2
 
 LATE_S = 0.25  # a machine this far behind gives up the lost time instead of racing after it
 TRUTH_PERIOD_S = 0.1
@@ -133,7 +135,14 @@ def _stop_without(parent: int, stop: threading.Event) -> None:
 
 
 def serve_world(
-    world: str, seed: int, *, duration_s: float, truth_path: Path | None, gui: bool, parent: int | None = None
+    world: str,
+    seed: int,
+    *,
+    duration_s: float,
+    truth_path: Path | None,
+    gui: bool,
+    parent: int | None = None,
+    mounting: Mounting | None = None,
 ) -> None:
     """Serve one world until a signal, the end of the time or of the parent process. Raises BadWorld."""
     stop = threading.Event()
@@ -148,7 +157,7 @@ def serve_world(
     built = worlds.load(world)
     for remark in built.remarks:
         sys.stderr.write(f"{remark}\n")
-    simulator = Simulator(built, seed, gui=gui)
+    simulator = Simulator(built, seed, gui=gui, mounting=mounting)
     truth_log = truth_path.open("w", encoding="utf-8", buffering=1) if truth_path is not None else None
     server = PtyServer(simulator, truth_log)
     try:
@@ -179,6 +188,11 @@ def _say(answer: dict[str, object]) -> None:
         return  # whoever started us has gone; the ports may still be in use
 
 
+def _pose(text: str) -> Pose2:
+    x, y, yaw = (float(part) for part in text.split(","))
+    return (x, y, yaw)
+
+
 def main() -> int:
     """Read the arguments and serve."""
     parser = argparse.ArgumentParser(
@@ -194,6 +208,10 @@ def main() -> int:
     parser.add_argument("--truth", type=Path, default=None, help="write the true poses to this file, 10 Hz")
     parser.add_argument("--gui", action="store_true", help="open pybullet's window")
     parser.add_argument("--parent", type=int, default=None, help="end when this parent process is gone")
+    parser.add_argument(
+        "--laser", type=_pose, default=(0.0, 0.0, 0.0), metavar="X,Y,YAW", help="where it sits"
+    )
+    parser.add_argument("--upside-down", action="store_true", help="the laser hangs upside down")
     arguments = parser.parse_args()
     try:
         serve_world(
@@ -203,6 +221,7 @@ def main() -> int:
             truth_path=arguments.truth,
             gui=arguments.gui,
             parent=arguments.parent,
+            mounting=Mounting(arguments.laser, upside_down=arguments.upside_down),
         )
     except SimError as error:
         sys.stderr.write(f"{error}\n")

@@ -13,6 +13,7 @@ from lemtomap.sim.depth import DepthCamera, DepthConfig
 from lemtomap.sim.faults import Faults
 from lemtomap.sim.hokuyo import FakeHokuyoConfig, HokuyoFirmware
 from lemtomap.sim.link import HostPort, Link
+from lemtomap.sim.mounting import Mounting
 from lemtomap.sim.scene import Scene
 from lemtomap.sim.urg import Urg, UrgConfig
 from lemtomap.sim.world import World
@@ -70,9 +71,13 @@ class Simulator:
         config: SimConfig | None = None,
         *,
         gui: bool = False,
+        mounting: Mounting | None = None,
     ) -> None:
+        """`mounting`: where the laser sits, if not where `config` has it."""
         faults = faults or world.faults or Faults()
         config = _with_faults(config or SimConfig(), faults)
+        if mounting is not None:
+            config = replace(config, urg=replace(config.urg, mounting=mounting))
         base_rng, urg_rng, kobuki_rng, hokuyo_rng, mover_rng, depth_rng = np.random.default_rng(seed).spawn(6)
         self.world = world
         self.config = config

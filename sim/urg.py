@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from lemtomap.sim.body import BodyState
 from lemtomap.sim.hokuyo import FIRST_STEP, FRONT_STEP, INITIAL_RPM, LAST_STEP, NOT_MEASURABLE, SLITS
 from lemtomap.sim.hokuyo_stream import STEPS
+from lemtomap.sim.mounting import Mounting
 from lemtomap.sim.optics import NOTHING, WEAK, BeamHits, OpticsConfig, measure
 from lemtomap.sim.scene import Scene
-from lemtomap.sim.world import Pose2
 
 BEAMS = LAST_STEP - FIRST_STEP + 1
 TRACK = 16  # physics steps remembered: more than one turn
@@ -25,7 +25,7 @@ ANGLES_RAD: NDArray[np.float64] = np.array(
 class UrgConfig:
     """The sensor and where it sits."""
 
-    T_base_laser: Pose2 = (0.0, 0.0, 0.0)
+    mounting: Mounting = field(default_factory=Mounting)
     height_m: float = 0.25
     """Above the floor: on the TurtleBot's second plate."""
     optics: OpticsConfig = field(default_factory=OpticsConfig)
@@ -108,8 +108,8 @@ class Urg:
         beams_s = self.started_s + np.arange(beams.start + FIRST_STEP, beams.stop + FIRST_STEP) * self._slit_s
         x, y, yaw = (np.interp(beams_s, stamps, poses[:, column]) for column in range(3))
         cos, sin = np.cos(yaw), np.sin(yaw)
-        dx, dy, mount_yaw = config.T_base_laser
-        angle = ANGLES_RAD[beams] + mount_yaw
+        dx, dy, mount_yaw = config.mounting.T_base_laser
+        angle = mount_yaw + ANGLES_RAD[beams] * (-1.0 if config.mounting.upside_down else 1.0)
         starts, directions = np.empty((len(yaw), 3)), np.empty((len(yaw), 3))
         starts[:, 0] = x + cos * dx - sin * dy
         starts[:, 1] = y + sin * dx + cos * dy

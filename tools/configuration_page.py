@@ -5,26 +5,23 @@
 The page is made from the dataclasses themselves: it says what stands beside or below a field there.
 """
 
-import ast
-import dataclasses
-import inspect
-import io
-import textwrap
-import tokenize
-import typing
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from lemtomap.robot.config import RobotConfig
-from lemtomap.settings import Range, range_of
+from lemtomap.robot.settings.tree import Setting, SettingTable, tables
+from lemtomap.settings import Range
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "configuration.md"
 HEAD = """# Settings
 
-`lemtomap run`, `goto`, `teleop` and `record` take a TOML file of settings that differ from the defaults:
+`lemtomap sim`, `run`, `goto`, `teleop`, `record`, `map` and `replay` take a TOML file of settings that differ
+from the defaults, and single ones over it:
 
+    lemtomap config                              # every setting, its unit, its default
+    lemtomap config --write robot.toml           # a file to begin from, with what each is for
+    lemtomap config robot.toml --section nav     # what a file makes of them: value, and file:line or default
     lemtomap run --config robot.toml
+    lemtomap sim --config robot.toml --set nav.body.v_max_mps=0.3
 
     # robot.toml
     [ports]
@@ -38,7 +35,9 @@ HEAD = """# Settings
 
 A key that is unknown, of the wrong type or outside its range is refused in one line that names file, line,
 key, value and rule, before anything moves. The bounds of `[safety]` and `[smoother]` hold for programs too.
-Each run keeps the settings it used in its `summary.json`. Names end in their unit: m, s, rad, mps (m/s),
+Each run keeps the settings it used in its `summary.json` and in its recording: `replay` maps with those,
+unless `--config` gives others or `--set` changes some, and says so. In simulation the laser sits where
+`[laser]` says. Names end in their unit: m, s, rad, mps (m/s),
 radps (rad/s), mps2 (m/s²), v (volt).
 
 This page is made by `tools/configuration_page.py` from the program itself.
@@ -47,36 +46,21 @@ This page is made by `tools/configuration_page.py` from the program itself.
 
 def page() -> str:
     """Return the whole page."""
-    return HEAD + "".join(_table(cls, key, about) for cls, key, about in _tables(RobotConfig, ()))
+    return HEAD + "".join(_table(table) for table in tables() if table.key)
 
 
-def _tables(cls: Any, key: tuple[str, ...]) -> Iterator[tuple[Any, tuple[str, ...], dict[str, str]]]:
-    """Yield (dataclass, key, what is said of each field), each table before those within it."""
-    about = notes_of(cls)
-    if key:
-        yield cls, key, about
-    hints = typing.get_type_hints(cls)
-    for field in dataclasses.fields(cls):
-        if dataclasses.is_dataclass(hints[field.name]):
-            yield from _tables(hints[field.name], (*key, field.name))
+def _table(table: SettingTable) -> str:
+    rows = "".join(_row(setting) for setting in table.settings)
+    head = f"\n## [{'.'.join(table.key)}]\n\n{table.about}\n"
+    return head + ("\n| key | default | unit | range | |\n|---|---|---|---|---|\n" + rows if rows else "")
 
 
-def _table(cls: Any, key: tuple[str, ...], about: dict[str, str]) -> str:
-    told = " ".join(inspect.cleandoc(cls.__doc__ or "").replace("Raises BadSetting.", "").split())
-    rows = [_row(field, about.get(field.name, "")) for field in dataclasses.fields(cls) if _is_plain(field)]
-    head = f"\n## [{'.'.join(key)}]\n\n{told}\n"
-    return head + ("\n| key | default | range | |\n|---|---|---|---|\n" + "".join(rows) if rows else "")
-
-
-def _is_plain(field: "dataclasses.Field[Any]") -> bool:
-    return field.default is not dataclasses.MISSING
-
-
-def _row(field: "dataclasses.Field[Any]", note: str) -> str:
-    allowed = range_of(field)
+def _row(setting: Setting) -> str:
+    allowed = setting.allowed
     why = allowed.why if allowed is not None else ""
-    text = "; ".join(part for part in (note.rstrip("."), f"bounds: {why}" if why else "") if part)
-    return f"| `{field.name}` | {_shown(field.default)} | {_span(allowed)} | {_cell(text)} |\n"
+    text = "; ".join(part for part in (setting.note.rstrip("."), f"bounds: {why}" if why else "") if part)
+    cells = [f"`{setting.key[-1]}`", _shown(setting.default), setting.unit, _span(allowed), _cell(text)]
+    return f"| {' | '.join(cells)} |\n"
 
 
 def _span(allowed: Range | None) -> str:
@@ -95,40 +79,6 @@ def _shown(value: Any) -> str:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
-
-
-def notes_of(cls: Any) -> dict[str, str]:
-    """Return what the source says of each field: the comment beside it, or the string below it."""
-    source = textwrap.dedent(inspect.getsource(cls))
-    comments = _comments(source)
-    body = typing.cast("ast.ClassDef", ast.parse(source).body[0]).body
-    notes: dict[str, str] = {}
-    for statement, following in zip(body, [*body[1:], None], strict=True):
-        if not isinstance(statement, ast.AnnAssign) or not isinstance(statement.target, ast.Name):
-            continue
-        beside = [
-            comments[line]
-            for line in range(statement.lineno, (statement.end_lineno or 0) + 1)
-            if line in comments
-        ]
-        below = _string(following)
-        notes[statement.target.id] = " ".join([*beside, *([" ".join(below.split())] if below else [])])
-    return notes
-
-
-def _comments(source: str) -> dict[int, str]:
-    """Return the comment that ends each line, by its number."""
-    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
-    return {
-        token.start[0]: token.string.lstrip("# ")
-        for token in tokens
-        if token.type == tokenize.COMMENT and token.line[: token.start[1]].strip()
-    }
-
-
-def _string(statement: ast.stmt | None) -> str:
-    value = statement.value if isinstance(statement, ast.Expr) else None
-    return value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""
 
 
 if __name__ == "__main__":

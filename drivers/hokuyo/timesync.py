@@ -2,7 +2,7 @@
 
 from lemtomap.drivers.hokuyo.packets import STAMP_BITS
 
-_TICK_S = 1e-3
+_TICK_S = 1e-3  # SCIP 2.0: stamps count milliseconds
 
 
 class TimeSync:

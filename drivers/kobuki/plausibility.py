@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 from lemtomap.drivers.kobuki.packets import RAW_GYRO_DPS_PER_DIGIT, Feedback
 
+PERIOD_MS = 20  # protocol.rst
+GRID_MS = 1  # published logs show exact multiples of the period
+
 
 @dataclass(frozen=True, slots=True)
 class PlausibilityConfig:
     """Limits between two frames."""
 
-    period_ms: int = 20  # protocol.rst
-    grid_ms: int = 1  # published logs show exact multiples of the period
     max_wheel_ticks_per_ms: float = 12.0  # 1 m/s; the robot does 0.7, a lifted wheel a little more
     wheel_slack_ticks: int = 20
     max_wheel_change_ticks: int = 60  # 13 m/s2 from packet to packet; only a wall stops a wheel faster
@@ -86,7 +87,7 @@ class FrameGate:
         return broken
 
     def _off_grid(self, _before: Feedback, _frame: Feedback, elapsed_ms: int) -> bool:
-        period, grid = self._config.period_ms, self._config.grid_ms
+        period, grid = PERIOD_MS, GRID_MS
         return elapsed_ms < period - grid or (elapsed_ms + grid) % period > 2 * grid
 
     def _encoder_leaps(self, before: Feedback, frame: Feedback, elapsed_ms: int) -> bool:
@@ -99,7 +100,7 @@ class FrameGate:
         was_left, was_right, was_ms = self._wheels
         share = elapsed_ms / max(was_ms, 1)
         change = max(abs(left - share * was_left), abs(right - share * was_right))
-        return change > self._config.max_wheel_change_ticks * max(1.0, elapsed_ms / self._config.period_ms)
+        return change > self._config.max_wheel_change_ticks * max(1.0, elapsed_ms / PERIOD_MS)
 
     def _heading_leaps(self, before: Feedback, frame: Feedback, elapsed_ms: int) -> bool:
         a, b = before.inertial, frame.inertial
@@ -107,7 +108,7 @@ class FrameGate:
             return False
         turn = (b.angle_cdeg - a.angle_cdeg + 18000) % 36000 - 18000
         fastest = max(abs(a.rate_cdegps), abs(b.rate_cdegps))
-        periods = elapsed_ms / self._config.period_ms
+        periods = elapsed_ms / PERIOD_MS
         explained = 0.5 * (a.rate_cdegps + b.rate_cdegps) * elapsed_ms * 1e-3
         slack = self._config.max_heading_cdeg * periods + 0.5 * fastest * elapsed_ms * 1e-3
         return abs(turn - explained) > slack
@@ -120,11 +121,7 @@ class FrameGate:
         return all(abs(RAW_GYRO_DPS_PER_DIGIT * z - rate) > limit for _, _, z in frame.raw_gyro.samples)
 
     def _gyro_count_breaks(self, before: Feedback, frame: Feedback, elapsed_ms: int) -> bool:
-        if (
-            before.raw_gyro is None
-            or frame.raw_gyro is None
-            or elapsed_ms > self._config.period_ms + self._config.grid_ms
-        ):
+        if before.raw_gyro is None or frame.raw_gyro is None or elapsed_ms > PERIOD_MS + GRID_MS:
             return False
         expected = before.raw_gyro.frame_id + len(before.raw_gyro.samples)
         return (frame.raw_gyro.frame_id - expected) & 0xFF != 0

@@ -33,7 +33,7 @@ from lemtomap.drivers.kobuki.events import (
 from lemtomap.drivers.kobuki.identity import GAINS_SINCE, AskConfig, BaseIdentity
 from lemtomap.drivers.kobuki.packets import BadFrame, Feedback, Gains
 from lemtomap.drivers.kobuki.panel import Panel
-from lemtomap.drivers.kobuki.plausibility import FrameGate, PlausibilityConfig
+from lemtomap.drivers.kobuki.plausibility import PERIOD_MS, FrameGate, PlausibilityConfig
 from lemtomap.drivers.kobuki.samples import EdgeEvent, edges, sample_of
 
 KobukiEvent: TypeAlias = (
@@ -215,7 +215,7 @@ class KobukiSession:
     def _count_missed(self, frame: Feedback) -> None:
         if self._before is not None:
             elapsed_ms = (frame.basic.timestamp_ms - self._before.basic.timestamp_ms) & 0xFFFF
-            self.counters.missed += max(0, round(elapsed_ms / self.config.plausibility.period_ms) - 1)
+            self.counters.missed += max(0, round(elapsed_ms / PERIOD_MS) - 1)
 
     def _suspect(self, data: bytes, events: list[KobukiEvent]) -> None:
         """Name whoever sends bytes that are no frames, once."""

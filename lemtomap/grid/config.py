@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from lemtomap.errors import BadSetting
-from lemtomap.settings import within
+from lemtomap.settings import check_order, refuse, within
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,7 +12,7 @@ class SlamConfig:
     Values without another source were measured over the Intel, ACES, Killian and URG-04LX logs together.
     """
 
-    particles: int = within(5, 1, 500)  # thesis 3-4: "3 to 10 should suffice"
+    particles: int = within(5, 1, 1000)  # thesis 3-4: "3 to 10 should suffice"
     window_m: float = within(20.0, 4.0, 60.0)  # W of algorithm E-4
     resolution_m: float = within(0.05, 0.02, 0.2)
     max_range_m: float | None = within(None, 0.5, 30.0)
@@ -106,17 +105,19 @@ class SlamConfig:
     jump_rad: float = within(0.17, 0.01, 3.15)
 
     def __post_init__(self) -> None:
-        if self.max_range_m is not None and not 0.0 < self.max_range_m <= self.window_m / 2.0:
-            raise BadSetting(
-                f"max range {self.max_range_m} m with a window of {self.window_m} m: "
-                "the window must be at least twice as wide as the range"
+        window_m, resolution_m = self.window_m, self.resolution_m
+        if self.max_range_m is not None and not 0.0 < self.max_range_m <= window_m / 2.0:
+            refuse(
+                "the window must be at least twice as wide as the range",
+                max_range_m=self.max_range_m,
+                window_m=window_m,
             )
-        if self.resolution_m <= 0.0 or self.window_m < 20 * self.resolution_m:
-            raise BadSetting(
-                f"window {self.window_m} m with cells of {self.resolution_m} m has no room for a map"
-            )
+        if resolution_m <= 0.0 or window_m < 20 * resolution_m:
+            refuse("no room for a map in so few cells", window_m=window_m, resolution_m=resolution_m)
         if self.particles < 1:
-            raise BadSetting(f"particles {self.particles}: at least 1 is needed")
+            refuse("at least 1 is needed", particles=self.particles)
+        check_order(self, "collapse_share", "good_share")
+        check_order(self, "heading_least", "heading_most")
 
     @property
     def cells(self) -> int:

@@ -14,7 +14,7 @@ from lemtomap.grid.window import LookUp, Window
 from lemtomap.se2 import Pose
 
 NEWTON_ROUNDS = 12
-CLIMB_STEP_M, CLIMB_STEP_RAD, CLIMB_ROUNDS = 0.08, 0.04, 3
+CLIMB_STEP_M, CLIMB_STEP_RAD, CLIMB_ROUNDS = 0.08, 0.04, 3  # halved in each round, to two centimetres
 CLIMB_TRUST = 0.002  # score given up per unit of squared Mahalanobis distance from odometry
 SWEEP_STEP_M, SWEEP_STEP_RAD = 0.1, 0.05
 

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from lemtomap.errors import BadSetting
-from lemtomap.settings import within
+from lemtomap.settings import check_order, refuse, within
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +20,7 @@ class BodyLimits:
     def __post_init__(self) -> None:
         for name in ("radius_m", "v_max_mps", "w_max_radps", "acceleration_mps2", "braking_mps2"):
             if not getattr(self, name) > 0.0:
-                raise BadSetting(f"navigation: {name} = {getattr(self, name)} must be above 0")
+                refuse("must be above 0", **{name: getattr(self, name)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +53,15 @@ class CostmapConfig:
     """Of a metre beside it: a bar is longer than the piece that was touched, ..."""
     contact_wide_m: float = within(0.35, 0.0, 2.0)
     """... by this much; it stays open, for there may be no other way."""
+    contact_edge_m: float = within(0.2, 0.0, 2.0)
+    """Over this much that price falls off."""
+    contact_again_s: float = within(30.0, 1.0, 3600.0)
+    """What is felt again after so long was not gone when its mark was forgotten."""
+    tight_price: float = within(25.0, 1.0, 1000.0)
+    """Of a metre inside the body's margin, open only to leave it."""
+    agree_s: float = within(0.5, 0.05, 10.0)  # the laser saw it so lately: then it watches what a camera saw
+    hold_m: float = within(0.9, 0.1, 5.0)
+    """Live obstacles this near to a closed place are believed until it opens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +83,46 @@ class DwaConfig:
     """Metres of way per rad/s: prefer straight of equal choices."""
     change_weight: float = within(0.03, 0.0, 10.0)
     """Metres of way per rad/s of change: prefer steady of equal choices."""
+    tightest_m: float = within(0.10, 0.02, 0.18)
+    """With an obstacle this near to the axle the map is wrong or the robot is: stand still."""
+    creep_mps: float = within(0.06, 0.01, 0.3)  # the last centimetres to where it stops, no slower
+    held_mps: float = within(0.03, 0.0, 0.2)  # an arc that is slower than this leads nowhere
+    near_m: float = within(1.3, 0.0, 5.0)
+    """This near to where it stops, the robot looks at the spot itself and no longer at the way ahead."""
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionConfig:
+    """The last check on raw range points, before the command leaves navigation."""
+
+    skin_m: float = within(0.015, 0.005, 0.2)
+    """Beyond the body's radius; the URG-04LX errs by 30 mm at 1 m, so a wider skin would stick at walls."""
+    stop_short_m: float = within(0.03, 0.0, 0.5)  # of whatever stands on the arc
+    horizon_s: float = within(2.0, 1.0, 10.0)  # of the arc: longer than braking from full speed takes
+    step_s: float = within(0.05, 0.005, 0.1)  # 2.5 cm at full speed: less than a chair's leg and the skins
+    standing_share: float = within(0.05, 0.0, 0.5)
+    """A robot held to less than this share of its speed may turn freely: it is round."""
+    turn_away_radps: float = within(0.5, 0.0, 1.5)  # from what holds it; a slight turn slips past a door post
+    fresh_s: float = within(0.6, 0.15, 2.0)
+    """Range points older than this say nothing about what is in front of the body now."""
+    reach_m: float = within(
+        1.6, 0.5, 10.0
+    )  # further points are not looked at: the horizon at full speed and a bit
+
+
+@dataclass(frozen=True, slots=True)
+class FollowConfig:
+    """When the robot turns on the spot and when it bends round."""
+
+    look_m: float = within(0.40, 0.1, 3.0)
+    """The way's direction is read this far along it."""
+    moving_mps: float = within(0.10, 0.0, 0.5)  # faster than this the robot is under way ...
+    moving_turn_rad: float = within(1.9, 0.1, 3.15)
+    """... and bends round rather than stops, unless the way leads back."""
+    held_turn_rad: float = within(0.15, 0.02, 1.6)
+    """A robot that no arc lets forward faces its way first."""
+    at_node_m: float = within(0.5, 0.1, 3.0)  # a node this near is passed, ...
+    by_node_m: float = within(1.2, 0.1, 5.0)  # ... and also one this near, when the way to it is roundabout
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +162,9 @@ class RecoveryConfig:
     """... after so many times as long when it is closed once more, ..."""
     block_longest_s: float = within(1800.0, 1.0, 604800.0)  # ... but not after longer than this
     lost_patience_s: float = within(20.0, 1.0, 3600.0)
+    bump_back_m: float = within(0.15, 0.02, 1.0)  # off what was just bumped into
+    stayed_m: float = within(0.4, 0.0, 5.0)
+    """A robot that has not come further than this is as stuck with a new goal as with the old one."""
     attempts: int = within(2, 1, 100)  # times through the ladder before giving up ...
     forgive_m: float = within(3.0, 0.1, 1000.0)  # ... unless this much way was made good in between
 
@@ -148,6 +199,8 @@ class NavConfig:
     body: BodyLimits = field(default_factory=BodyLimits)
     costmap: CostmapConfig = field(default_factory=CostmapConfig)
     dwa: DwaConfig = field(default_factory=DwaConfig)
+    follow: FollowConfig = field(default_factory=FollowConfig)
+    collision: CollisionConfig = field(default_factory=CollisionConfig)
     route: RouteConfig = field(default_factory=RouteConfig)
     recovery: RecoveryConfig = field(default_factory=RecoveryConfig)
     explore: ExploreConfig = field(default_factory=ExploreConfig)
@@ -161,3 +214,7 @@ class NavConfig:
     turn_start_rad: float = within(1.05, 0.1, 3.15)
     """Turn in place when the way starts further off than this (60 degrees)."""
     turn_end_rad: float = within(0.30, 0.02, 3.15)
+
+    def __post_init__(self) -> None:
+        check_order(self, "turn_end_rad", "turn_start_rad")
+        check_order(self, "period_s", "plan_period_s", "look_period_s")

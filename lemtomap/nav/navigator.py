@@ -7,12 +7,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap import se2
-from lemtomap.errors import NoRoute
+from lemtomap.errors import NoRoute, NotStarted
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.dwa import approach
@@ -25,6 +27,7 @@ from lemtomap.nav.motion.recovery import (
     RecoverySequence,
 )
 from lemtomap.nav.outlook import FarLook, Lookout, WindowLook
+from lemtomap.nav.places import goal_at
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.sliding import Target, is_roundabout, place_of
 from lemtomap.nav.route.watching import EdgeClock
@@ -38,18 +41,24 @@ from lemtomap.nav.types import (
     NavState,
     ObstacleSighting,
 )
+from lemtomap.samples import as_finite, as_points, check_kind
 from lemtomap.se2 import Pose
-from lemtomap.types import MapView, RouteGraph, Twist
+from lemtomap.topo.file.reader import TopoReader
+from lemtomap.types import MapView, Odometry, RouteGraph, Scan, Twist
 
-BUMP_BACK_M = 0.15
-AT_NODE_M = 0.5
-BY_NODE_M = 1.2
-STAYED_M = 0.4
 REST = Twist(0.0, 0.0)
 
 
 class Navigator:
-    """Drives to goals, one at a time; a new goal replaces the old one without a stop."""
+    """Drives to goals, one at a time; a new goal replaces the old one without a stop.
+
+        with lemtomap.Navigator.open("my.lemto") as navigator:
+            navigator.go_to("kitchen")
+            twist = navigator.drive(mapper.view(), odometry, scan).twist
+
+    `open`, `go_to` and `drive` are for programs that map and drive in turn; a robot with a thread for each
+    gives `set_goal` and `step` what it has.
+    """
 
     def __init__(
         self, config: NavConfig | None = None, far: Callable[[Surroundings], FarLook] = WindowLook
@@ -70,6 +79,79 @@ class Navigator:
         self._ladder = RecoverySequence(self.config.recovery)
         self._way_back = BreadcrumbTrail()
         self._edge_clock = EdgeClock()
+        self._map: TopoReader | None = None
+        """The file that `open` was given."""
+        self._asked: Goal | None = None
+        """Goes to `set_goal` with the next `drive`, which knows the time."""
+
+    @classmethod
+    def open(cls, path: Path | str, *, config: NavConfig | None = None) -> Self:
+        """Navigate by a map file, which a Mapper may be writing. Raises BadMap, and BadSample for arguments
+        that are none.
+        """
+        check_kind("Navigator.open: path", path, str, Path)
+        check_kind("Navigator.open: config", config, NavConfig, type(None))
+        navigator = cls(config)
+        navigator._map = TopoReader(path)
+        return navigator
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the map file that `open` opened."""
+        if self._map is not None:
+            self._map.close()
+
+    def go_to(self, place: Goal | int | str) -> None:
+        """Drive from now on to a node, by number or name, or to a point in a node's frame.
+
+        A Mapper writes what is new twice a second; a node is a place to go to from then on.
+        Raises NoRoute when the map has no such place, BadSample for what is none, NotStarted without `open`.
+        """
+        self._asked = goal_at(place, self._opened())
+
+    def drive(
+        self,
+        view: MapView,
+        odometry: Odometry,
+        seen: Scan | NDArray[np.floating] | Sequence[Sequence[float]] | None = None,
+        bumps: Sequence[Contact] = (),
+    ) -> NavOutput:
+        """Run one control cycle, best ten times a second: `.twist` is what the base should do now.
+
+        `.state`, `.reason` and `.text` say how it goes; `.events` is for the next `Mapper.update`.
+        odometry: the base now; its stamp is the time. seen: a new scan taken there, or points float (N, 2),
+        metres, base frame; None: nothing new. bumps: contacts since the last call. Raises BadSample for
+        arguments that are none, NotStarted without `open`.
+        """
+        graph = self._opened()
+        check_kind("Navigator.drive: view", view, MapView)
+        check_kind("Navigator.drive: odometry", odometry, Odometry)
+        T_odom_base, now_s = as_finite("Odometry.T_odom_base", odometry.T_odom_base), odometry.stamp_s
+        sighting = (
+            ObstacleSighting.from_scan(seen, T_odom_base)
+            if isinstance(seen, Scan)
+            else None
+            if seen is None
+            else as_points("Navigator.drive: seen", seen)
+        )
+        for contact in bumps:
+            check_kind("Navigator.drive: bumps", contact, Contact)
+        if self._asked is not None:
+            self.set_goal(self._asked, now_s)
+            self._asked = None
+        _ = graph.version  # asked once a cycle: here the reader forgets what has changed
+        twist = Twist(odometry.v_mps, odometry.w_radps)
+        return self.step(view, graph, T_odom_base, twist, sighting, bumps, now_s)
+
+    def _opened(self) -> TopoReader:
+        if self._map is None:
+            raise NotStarted("this navigator has no map file: make it with Navigator.open")
+        return self._map
 
     @property
     def goal(self) -> Goal | None:
@@ -82,7 +164,7 @@ class Navigator:
         A robot that has hardly moved since the last goal keeps its count of failed recoveries: whoever moves
         the goal about while it is stuck does not keep it from giving up.
         """
-        stayed = self._goal is not None and self._way_back.stayed_m < STAYED_M
+        stayed = self._goal is not None and self._way_back.stayed_m < self.config.recovery.stayed_m
         self._goal = Goal(goal) if isinstance(goal, int) else goal
         self._way.route = None
         self.lookout.restart()
@@ -148,7 +230,7 @@ class Navigator:
         for contact in bumps:
             moment.events.append(self.surroundings.touch(contact, moment.map_view, moment.T_grid_base))
         if bumps and self._goal is not None:
-            self._ladder.back_off(moment.T_odom_base, moment.now_s, BUMP_BACK_M)
+            self._ladder.back_off(moment.T_odom_base, moment.now_s, self.config.recovery.bump_back_m)
             self.lookout.forget()
 
     # ---- one cycle with a goal ----
@@ -243,8 +325,8 @@ class Navigator:
             return False
         away_m = float(np.hypot(*(place - moment.T_grid_base)[:2]))
         if not target.final:
-            return away_m < AT_NODE_M
-        return away_m < BY_NODE_M and is_roundabout(route, goal, target, plan.length_m)
+            return away_m < self.config.follow.at_node_m
+        return away_m < self.config.follow.by_node_m and is_roundabout(route, goal, target, plan.length_m)
 
     # ---- driving ----
 
@@ -267,7 +349,7 @@ class Navigator:
         self, route: Route, plan: MetricPlan, target: Target, step: Step, moment: CycleInput
     ) -> NavOutput:
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
-        twist = limit_twist(step.twist, points, self.config.body)
+        twist = limit_twist(step.twist, points, self.config.body, self.config.collision)
         state = NavState.TURNING if step.motion == FollowerState.TURN else NavState.DRIVING
         reason = (
             NavReason.OBSTACLE
@@ -340,7 +422,7 @@ class Navigator:
         if wanted.v_mps < 0.0:
             twist = replace(twist, v_mps=min(twist.v_mps, 0.0))  # no braking distance into what was touched
         points = self.surroundings.points(moment.T_odom_base, moment.now_s)
-        twist = limit_twist(twist, points, self.config.body)
+        twist = limit_twist(twist, points, self.config.body, self.config.collision)
         return self._output(moment, twist, NavState.RECOVERING, NavReason.OBSTACLE, name)
 
     def _room_behind(self, moment: CycleInput) -> bool:

@@ -22,12 +22,7 @@ from lemtomap.topo.events import Bumped
 from lemtomap.topo.graph import Mark
 from lemtomap.types import MapView, RouteGraph
 
-FRESH_S = 0.6
-"""Range points older than this say nothing about what is in front of the body now."""
-HOLD_M = 0.9
-SAME_M = 0.05
-AGAIN_S = 30.0
-"""What is felt again after so long was not gone when its mark was forgotten."""
+SAME_M = 0.05  # a cell: two touches of one spot
 ASIDE_M = (-0.25, 0.0, 0.25)
 """A Kobuki's bumper tells one of three directions and nothing of how wide the thing is. What is overlooked
 is a bar or a chair's foot: this much to both sides of the touch, and the mark's own radius, covers it."""
@@ -108,7 +103,7 @@ class Surroundings:
             return math.inf
         config, longest_s = self._config.costmap, 0.0
         for hazard, place in self._placed(map_view):
-            again = contact.stamp_s - hazard.stamp_s > AGAIN_S
+            again = contact.stamp_s - hazard.stamp_s > config.contact_again_s
             if again and np.hypot(*(p_grid - place).T).min() < config.contact_radius_m:
                 longest_s = max(longest_s, hazard.shut_s)
         return min(max(config.contact_hard_s, config.contact_growth * longest_s), config.contact_memory_s)
@@ -156,8 +151,9 @@ class Surroundings:
 
     def points(self, T_odom_base: Pose, now_s: float) -> Points:
         """Return the raw range points near the body, present base frame, float64 (N, 2)."""
-        fresh = [s for s in self._sightings.values() if now_s - s.stamp_s < FRESH_S]
-        return points_now(fresh, T_odom_base)
+        collision = self._config.collision
+        fresh = [s for s in self._sightings.values() if now_s - s.stamp_s < collision.fresh_s]
+        return points_now(fresh, T_odom_base, collision.reach_m)
 
     def hits_grid(self, T_grid_odom: Pose) -> Points:
         """Return what each sensor hit last, float64 (N, 2), metres, grid frame."""
@@ -169,7 +165,7 @@ class Surroundings:
 
     def hold(self, p_grid: tuple[float, float], until_s: float) -> None:
         """Believe the live obstacles around a closed place until then, or until they are seen to be gone."""
-        self._costmap.hold(p_grid, HOLD_M, until_s)
+        self._costmap.hold(p_grid, self._config.costmap.hold_m, until_s)
 
     def forget_live(self) -> None:
         """Drop live obstacles; walls and hazards stay."""

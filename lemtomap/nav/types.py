@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.samples import as_number, as_row, as_whole
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import NavEvent
 from lemtomap.types import Scan, Twist
@@ -34,6 +35,17 @@ class Goal:
     """Heading to arrive with; None: any."""
     tolerance_m: float | None = None
     """None: NavConfig.goal_tolerance_m."""
+
+    def __post_init__(self) -> None:
+        """Raise BadSample for what is no place."""
+        x, y = as_row("Goal.p_node (x m, y m)", self.p_node, np.float64, 2).tolist()
+        point = as_number("Goal.p_node: x", x, "metres"), as_number("Goal.p_node: y", y, "metres")
+        object.__setattr__(self, "node_id", as_whole("Goal.node_id", self.node_id))
+        object.__setattr__(self, "p_node", point)
+        if self.yaw_node_rad is not None:
+            as_number("Goal.yaw_node_rad", self.yaw_node_rad, "radians")
+        if self.tolerance_m is not None:
+            as_number("Goal.tolerance_m", self.tolerance_m, "metres", 0.0)
 
 
 class NavState(StrEnum):

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 
 from lemtomap.displacement import WatchConfig
-from lemtomap.errors import BadSetting
-from lemtomap.settings import within
+from lemtomap.settings import check_order, refuse, within
 from lemtomap.topo.place.align import AlignConfig
 
 
@@ -64,10 +63,17 @@ class TopoConfig:
 
     def __post_init__(self) -> None:
         if self.new_node_distance_m <= 0.0:
-            raise BadSetting(f"new_node_distance_m must be above 0, is {self.new_node_distance_m}")
+            refuse("must be above 0", new_node_distance_m=self.new_node_distance_m)
         if not 0.0 <= self.association_margin_m < self.new_node_distance_m:
-            raise BadSetting("association_margin_m must be at least 0 and below new_node_distance_m")
-        if self.local_radius_m < self.near_neighbour_max_m:
-            raise BadSetting("local_radius_m must not be below near_neighbour_max_m")
+            refuse(
+                "the margin must be at least 0 and below the distance",
+                association_margin_m=self.association_margin_m,
+                new_node_distance_m=self.new_node_distance_m,
+            )
+        check_order(self, "near_neighbour_max_m", "local_radius_m")
         if self.paged_nodes < 2 * self.local_limit:
-            raise BadSetting("paged_nodes must be at least twice local_limit")
+            refuse(
+                "paged_nodes must be at least twice local_limit",
+                paged_nodes=self.paged_nodes,
+                local_limit=self.local_limit,
+            )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lemtomap.displacement import WatchConfig, pose_quality
-from lemtomap.errors import LemtomapError
+from lemtomap.errors import NotStarted
 from lemtomap.se2 import Pose
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.doubt import COVARIANCE_FLOOR, relative_to_window
@@ -20,10 +20,6 @@ from lemtomap.topo.kernels import poses as kernels
 from lemtomap.topo.local import LocalMap
 from lemtomap.topo.neighbours import in_sight
 from lemtomap.types import GridView, SlamUpdate
-
-
-class NotStarted(LemtomapError):
-    """A snapshot was asked for before the first scan."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,14 +1,16 @@
 """Commands that drive a robot, real or simulated, and look at what it did."""
 
 import math
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from lemtomap.robot.cli.help import add
+from lemtomap.robot.cli.options import Config, Set
 from lemtomap.robot.missions.places import check_places, mission_from
 
 MISSIONS = (
@@ -24,9 +26,6 @@ MapFile = Annotated[
 ]
 Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="folder for the results; default runs/DATE_TIME")
-]
-Config = Annotated[
-    Path | None, typer.Option(metavar="FILE.toml", help="settings that differ from the defaults")
 ]
 RecordLimit = Annotated[
     str,
@@ -57,6 +56,7 @@ def register(app: typer.Typer) -> None:
         "lemtomap sim --map office.lemto --mission goto:12   find its place in that map, then go",
         "lemtomap sim --world plan.yaml --duration 600       any ROS map_server floor plan",
         "lemtomap sim --fast --nav metric --mission goto:13:3    the metric baseline, to a point of the plan",
+        "lemtomap sim --config robot.toml --set nav.body.v_max_mps=0.3    other settings",
         "lemtomap sim --serve                                only the fake hardware, on two pseudo-terminals",
     )
     add(
@@ -84,6 +84,7 @@ def register(app: typer.Typer) -> None:
         replay,
         "lemtomap replay runs/demo --out runs/again",
         "lemtomap replay runs/demo --out runs/window --slam window",
+        "lemtomap replay runs/demo --set slam.window_m=12     the run's own settings, but for one",
     )
     add(
         app,
@@ -119,18 +120,26 @@ def sim(
     nav: Annotated[
         Nav, typer.Option(help="metric: the baseline, AMCL and a planner over the whole plan; goto:X:Y")
     ] = Nav.TOPOLOGICAL,
+    config: Config = None,
+    orders: Set = None,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="folder for the results; an earlier run's are replaced")
     ] = Path("runs/sim"),
 ) -> None:
     """Run the whole robot in a simulated building, on fake serial ports."""
+    from lemtomap.robot.settings.read import read_settings
+
+    settings = read_settings(config, orders or ())
     if world == "list":
         typer.echo(list_worlds(out))
         return
     if serve:
+        from lemtomap.robot.runs.sim_server import mounting_of
         from lemtomap.sim.serve import serve_world
 
-        serve_world(world, seed, duration_s=math.inf, truth_path=None, gui=gui)
+        serve_world(
+            world, seed, duration_s=math.inf, truth_path=None, gui=gui, mounting=mounting_of(settings.config)
+        )
         return
     if nav is Nav.TOPOLOGICAL:
         check_places(mission_from(mission, map_file), map_file)
@@ -150,6 +159,7 @@ def sim(
         map_path=map_file,
         depth=depth,
         record_limit=parse_size(record_limit),
+        config=settings.config,
     )
     if nav is Nav.METRIC:
         from lemtomap.robot.runs.metric import run_metric, told_after_metric
@@ -187,6 +197,7 @@ def run(
     duration: Duration = math.inf,
     out: Out = None,
     config: Config = None,
+    orders: Set = None,
     record_limit: RecordLimit = "2GB",
     seed: Annotated[int, typer.Option(metavar="N", help="of the particles")] = 0,
 ) -> None:
@@ -195,11 +206,9 @@ def run(
     from lemtomap.robot.devices.parts import parse_size
     from lemtomap.robot.runs.real import RobotOptions
 
+    settings = _settings(config, orders, kobuki, hokuyo)
     limit = parse_size(record_limit)
-    _drive(
-        "run",
-        RobotOptions(mission, duration, kobuki, hokuyo, map_file, out, config, seed, record_limit=limit),
-    )
+    _drive("run", RobotOptions(mission, duration, settings, map_file, out, seed, record_limit=limit))
 
 
 def goto(
@@ -212,6 +221,7 @@ def goto(
     hokuyo: Hokuyo = None,
     out: Out = None,
     config: Config = None,
+    orders: Set = None,
 ) -> None:
     """Drive the real robot to a place of a map."""
     if not map_file.exists():
@@ -219,7 +229,8 @@ def goto(
     check_places(f"goto:{place}", map_file)
     from lemtomap.robot.runs.real import RobotOptions
 
-    _drive("goto", RobotOptions(f"goto:{place}", math.inf, kobuki, hokuyo, map_file, out, config))
+    settings = _settings(config, orders, kobuki, hokuyo)
+    _drive("goto", RobotOptions(f"goto:{place}", math.inf, settings, map_file, out))
 
 
 def teleop(
@@ -229,13 +240,15 @@ def teleop(
     map_file: MapFile = None,
     out: Out = None,
     config: Config = None,
+    orders: Set = None,
 ) -> None:
     """Drive the real robot by the keyboard, mapping on the way; a digit says on which floor it is now."""
     from lemtomap.robot.motion.teleop import HELP
     from lemtomap.robot.runs.real import RobotOptions
 
+    settings = _settings(config, orders, kobuki, hokuyo)
     typer.echo(HELP)
-    _drive("teleop", RobotOptions("idle", math.inf, kobuki, hokuyo, map_file, out, config, by_hand=True))
+    _drive("teleop", RobotOptions("idle", math.inf, settings, map_file, out, by_hand=True))
 
 
 def record(
@@ -245,14 +258,16 @@ def record(
     duration: Duration = math.inf,
     out: Out = None,
     config: Config = None,
+    orders: Set = None,
     record_limit: RecordLimit = "2GB",
 ) -> None:
     """Record both devices' bytes, and map, without driving; 'lemtomap replay' maps the recording anew."""
     from lemtomap.robot.devices.parts import parse_size
     from lemtomap.robot.runs.real import RobotOptions
 
+    settings = _settings(config, orders, kobuki, hokuyo)
     limit = parse_size(record_limit)
-    _drive("record", RobotOptions("idle", duration, kobuki, hokuyo, None, out, config, record_limit=limit))
+    _drive("record", RobotOptions("idle", duration, settings, None, out, record_limit=limit))
 
 
 def replay(
@@ -267,15 +282,20 @@ def replay(
     seed: Annotated[
         int | None, typer.Option(metavar="N", help="of the particles; default: as the run mapped")
     ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.toml", help="settings instead of those that the run recorded"),
+    ] = None,
+    orders: Set = None,
 ) -> None:
     """Feed a recorded run's bytes through the same drivers and map it anew, as fast as the machine can."""
     from lemtomap.robot.output.closing_lines import conclude
     from lemtomap.robot.output.progress import progress_bar
-    from lemtomap.robot.runs.replayed import replay_run
+    from lemtomap.robot.runs.replayed import Changes, replay_run
 
     folder = out or Path("runs") / f"replay_{datetime.now(UTC).astimezone():%Y-%m-%d_%H-%M-%S}"
     with progress_bar("replay") as bar:
-        summary = replay_run(recording, folder, bar, slam=slam, seed=seed)
+        summary = replay_run(recording, folder, bar, Changes(slam, seed, config, tuple(orders or ())))
     conclude(summary)
 
 
@@ -290,6 +310,18 @@ def view(
     from lemtomap.robot.output.view import open_recording
 
     open_recording(path, typer.echo, web=web)
+
+
+def _settings(
+    config: Path | None, orders: Sequence[str] | None, kobuki: str | None, hokuyo: str | None
+) -> Any:
+    """Return the settings of the real robot, a RobotConfig. Raises BadSetting."""
+    from serial.tools import list_ports
+
+    from lemtomap.robot.settings.read import read_settings
+
+    options = {"--kobuki": ("ports.kobuki", kobuki), "--hokuyo": ("ports.hokuyo", hokuyo)}
+    return read_settings(config, orders or (), options=options, ports=list_ports.comports).config
 
 
 def _drive(name: str, options: object) -> None:

@@ -14,6 +14,7 @@ import typer
 
 from lemtomap.drivers.errors import DriverError
 from lemtomap.errors import LemtomapError
+from lemtomap.robot.cli import config as cli_config
 from lemtomap.robot.cli import doctor as cli_doctor
 from lemtomap.robot.cli import drive as cli_drive
 from lemtomap.robot.cli import file as cli_file
@@ -64,6 +65,7 @@ def _program(
 
 
 cli_drive.register(app)
+cli_config.register(app)
 cli_doctor.register(app)
 cli_map.register(app)
 cli_file.register(app)

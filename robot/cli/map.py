@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from lemtomap.robot.cli.help import Interrupted, add
+from lemtomap.robot.cli.options import Config, Set
 
 
 class Slam(StrEnum):
@@ -57,9 +58,11 @@ def map_(
         ),
     ] = None,
     particles: Annotated[
-        int | None, typer.Option(metavar="N", min=1, max=1000, help="default 5 (rolling), 30 (gmapping)")
+        int | None, typer.Option(metavar="N", help="default 5 (rolling), 30 (gmapping)")
     ] = None,
-    window: Annotated[float, typer.Option(metavar="M", help="width of the window, metres")] = 20.0,
+    window: Annotated[
+        float | None, typer.Option(metavar="M", help="width of the window, metres; default 20")
+    ] = None,
     max_range: Annotated[
         float | None,
         typer.Option(metavar="M", help="usable range; at most half the window, which is also the default"),
@@ -74,13 +77,16 @@ def map_(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="same log and seed: same map, byte for byte")] = 0,
+    config: Config = None,
+    orders: Set = None,
 ) -> None:
     """Make a map of a recorded log."""
     from lemtomap.robot.output.progress import progress_bar
-    from lemtomap.robot.runs.map_log import MapLogOptions, map_log
+    from lemtomap.robot.runs.map_log import MapLogOptions, chosen, map_log
 
     kind = slam or (Slam.WINDOW if particles is None else Slam.ROLLING)
-    options = MapLogOptions(log, out, kind.value, particles, window, max_range, seed, field_of_view)
+    settings = chosen(kind.value, config, orders or (), particles, window, max_range)
+    options = MapLogOptions(log, out, kind.value, settings, seed, field_of_view)
     try:
         with progress_bar(f"mapping {log.name}") as bar:
             told = map_log(options, bar)

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from lemtomap.drivers.hokuyo.session import HokuyoSession
 from lemtomap.drivers.kobuki.session import KobukiSession
+from lemtomap.robot.config import DevicesConfig
 from lemtomap.robot.core import RobotCore, Samples
 from lemtomap.robot.devices.recorded import Gap, Recording
 from lemtomap.robot.devices.recording import (
@@ -24,9 +25,12 @@ from lemtomap.robot.exchange import TimedScan
 BRIDGED_S = 4.0  # the encoders count 65,536 ticks, 5.6 m: after longer they may have gone round unseen
 
 
-def replay_events(recording: Recording) -> Iterator[tuple[float, Samples | Gap]]:
+def replay_events(
+    recording: Recording, devices: DevicesConfig | None = None
+) -> Iterator[tuple[float, Samples | Gap]]:
     """Yield (clock value, events) of each recorded call that told something, and the gaps between them."""
-    base, laser = KobukiSession(), HokuyoSession()
+    devices = devices or DevicesConfig()
+    base, laser = KobukiSession(devices.kobuki), HokuyoSession(devices.hokuyo)
     for entry in recording.entries():
         if isinstance(entry, Gap):
             yield entry.from_s, entry
@@ -49,7 +53,7 @@ def replay_map(
     """
     now_s = 0.0
     mapped = _MappedThen(recording) if as_then else None
-    for now_s, told in replay_events(recording):
+    for now_s, told in replay_events(recording, core.devices):
         if isinstance(told, Gap):
             mapped = None
             if told.until_s is not None and told.until_s - told.from_s > BRIDGED_S:

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from lemtomap.drivers.hokuyo.session import HokuyoEvent, HokuyoSession
-from lemtomap.drivers.kobuki.session import KobukiEvent, KobukiSession
+from lemtomap.drivers.hokuyo.session import HokuyoConfig, HokuyoEvent, HokuyoSession
+from lemtomap.drivers.kobuki.session import KobukiConfig, KobukiEvent, KobukiSession
 from lemtomap.robot.clock import stamp_ns
 from lemtomap.robot.devices.recording import (
     HOKUYO,
@@ -40,9 +40,9 @@ class RecordedSession(Protocol[E]):
 class RecordedKobukiSession(KobukiSession):
     """Writes down every call that changes what comes out."""
 
-    def __init__(self, record: Sink) -> None:
+    def __init__(self, record: Sink, config: KobukiConfig | None = None) -> None:
         self._record = record
-        super().__init__()
+        super().__init__(config)
 
     def receive(self, data: bytes, now_s: float) -> list[KobukiEvent]:
         """Take bytes, return events."""
@@ -60,9 +60,9 @@ class RecordedKobukiSession(KobukiSession):
 class RecordedHokuyoSession(HokuyoSession):
     """Writes down every call that changes what comes out, and when the laser began to stream."""
 
-    def __init__(self, record: Sink) -> None:
+    def __init__(self, record: Sink, config: HokuyoConfig | None = None) -> None:
         self._record = record
-        super().__init__()
+        super().__init__(config)
 
     def reopened(self) -> None:
         """Begin anew after the port was opened again."""

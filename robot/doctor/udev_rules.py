@@ -10,7 +10,7 @@ from lemtomap.errors import BadSetting
 RULES = Path(__file__).resolve().parent / "udev" / "60-lemtomap.rules"
 FOLDER = Path("/etc/udev/rules.d")
 INSTALL = "sudo lemtomap doctor --install-udev"
-RELOAD_LIMIT_S = 10.0
+RELOAD_LIMIT_S = 10.0  # udevadm answers at once, or not at all in a container
 
 
 def install_udev(folder: Path = FOLDER) -> Path:

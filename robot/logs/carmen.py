@@ -37,7 +37,7 @@ from lemtomap.robot.logs.records import Laser, Record, RecordedLog
 from lemtomap.robot.logs.remarks import Remarks
 from lemtomap.se2 import Pose
 
-FARTHEST_SEEN_M = 80.0
+FARTHEST_SEEN_M = 80.0  # what a SICK LMS can see
 POSED = ("FLASER", "ROBOTLASER1")  # lines with the odometry pose in them
 RAW = "RAWLASER1"
 STAMPS = 3  # fields at the end of every message: ipc_stamp host logger_stamp

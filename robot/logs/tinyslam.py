@@ -23,13 +23,13 @@ from lemtomap.robot.logs.records import Laser, Record, RecordedLog
 from lemtomap.robot.logs.remarks import Remarks
 
 RANGES = 682
-WHEEL_RADIUS_M = 0.077
-HALF_AXLE_M = 0.165
+WHEEL_RADIUS_M = 0.077  # of the rover, as tinySLAM's own program has it
+HALF_AXLE_M = 0.165  # likewise
 METRES_PER_TICK = 2.0 * math.pi * WHEEL_RADIUS_M / 2000.0  # 2000 ticks for each turn of a wheel
 MOST_TICKS = 1e9
-LASER_AHEAD_M = 0.145
-FIRST_ERROR_FREE_MM = 20
-LONGEST_MM = 1e6
+LASER_AHEAD_M = 0.145  # likewise
+FIRST_ERROR_FREE_MM = 20  # URG-04LX: below it an error code
+LONGEST_MM = 1e6  # no laser sees a kilometre
 ANGLE_STEP_RAD = 2.0 * math.pi / 1024.0  # URG-04LX data sheet: 0.36 degrees
 TURN_S = 0.1  # URG-04LX data sheet: 100 ms a turn of 1024 steps
 URG_04LX = Laser(

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from lemtomap.errors import BadSetting
-from lemtomap.nav.config import NavConfig
 from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal, NavOutput, NavState
@@ -136,14 +135,13 @@ class Dock:
 class Explore:
     """See everything that can be reached, then stop where the last opening was."""
 
-    def __init__(self, config: NavConfig | None = None) -> None:
-        self._config = config or NavConfig()
+    def __init__(self) -> None:
         self._explorer: Explorer | None = None
 
     def step(self, moment: MissionInput) -> Order:
         """Pass the explorer's goals on."""
         if self._explorer is None:
-            self._explorer = Explorer(nav=self._config)
+            self._explorer = Explorer(nav=moment.navigator.config)
         found = self._explorer.step(
             moment.view, moment.graph, moment.output, moment.T_odom_base, moment.now_s
         )

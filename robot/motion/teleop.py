@@ -12,45 +12,54 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from lemtomap.errors import BadSetting
+from lemtomap.settings import within
 from lemtomap.types import Twist
 
-FORWARD_MPS, TURN_RADPS = 0.3, 0.9  # a walking pace that a person can follow
-HOLD_S = 0.6  # a held key repeats after up to half a second; then the robot stops by itself
-REPEAT_S = 0.1
 HELP = "arrow keys or w a s d drive, space stops, a digit: on that floor now, q ends"
 
 KEY = re.compile(r"\x1b\[.|.", re.DOTALL)
 DIGITS = "0123456789"
 
 REST = Twist()
-WISHES = {
-    "w": Twist(FORWARD_MPS, 0.0),
-    "s": Twist(-FORWARD_MPS / 2, 0.0),
-    "a": Twist(0.0, TURN_RADPS),
-    "d": Twist(0.0, -TURN_RADPS),
-    "\x1b[A": Twist(FORWARD_MPS, 0.0),
-    "\x1b[B": Twist(-FORWARD_MPS / 2, 0.0),
-    "\x1b[D": Twist(0.0, TURN_RADPS),
-    "\x1b[C": Twist(0.0, -TURN_RADPS),
-    " ": REST,
-}
+
+
+@dataclass(frozen=True, slots=True)
+class TeleopConfig:
+    """How fast a person drives by the keyboard."""
+
+    forward_mps: float = within(0.3, 0.02, 0.65)  # a walking pace that a person can follow
+    backward_mps: float = within(0.15, 0.02, 0.2)  # half as fast: nobody sees behind
+    turn_radps: float = within(0.9, 0.1, 1.9)
+    hold_s: float = within(0.6, 0.2, 2.0)
+    """A held key repeats after up to half a second; then the robot stops by itself."""
+    repeat_s: float = within(0.1, 0.02, 0.3)  # between two wishes, well within the mux's 0.5 s
+
+
+def wishes_of(config: TeleopConfig) -> dict[str, Twist]:
+    """Return what each key asks for."""
+    forward, back = Twist(config.forward_mps, 0.0), Twist(-config.backward_mps, 0.0)
+    left, right = Twist(0.0, config.turn_radps), Twist(0.0, -config.turn_radps)
+    letters = {"w": forward, "s": back, "a": left, "d": right, " ": REST}
+    return letters | {"\x1b[A": forward, "\x1b[B": back, "\x1b[D": left, "\x1b[C": right}
 
 
 class Keys:
     """Turns key presses into wishes: the last key holds for a moment, then the wish is to stand."""
 
-    def __init__(self) -> None:
+    def __init__(self, config: TeleopConfig | None = None) -> None:
+        self.config = config or TeleopConfig()
+        self._wishes = wishes_of(self.config)
         self._wish = REST
-        self._pressed_s = -HOLD_S
+        self._pressed_s = -self.config.hold_s
 
     def press(self, key: str, now_s: float) -> None:
         """Take a key; unknown ones mean nothing."""
-        if key in WISHES:
-            self._wish, self._pressed_s = WISHES[key], now_s
+        if key in self._wishes:
+            self._wish, self._pressed_s = self._wishes[key], now_s
 
     def wish(self, now_s: float) -> Twist:
         """Return what the person wants now."""
-        return self._wish if now_s - self._pressed_s < HOLD_S else REST
+        return self._wish if now_s - self._pressed_s < self.config.hold_s else REST
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +74,9 @@ class KeyListener:
 
 
 @contextmanager
-def driven_by_hand(listener: KeyListener, now_s: Callable[[], float]) -> Iterator[None]:
+def driven_by_hand(
+    listener: KeyListener, now_s: Callable[[], float], config: TeleopConfig | None = None
+) -> Iterator[None]:
     """Pass on what the terminal says while the body runs. Raises BadSetting without a terminal."""
     if not sys.stdin.isatty():
         raise BadSetting("teleop: needs a terminal to read keys from")
@@ -74,9 +85,9 @@ def driven_by_hand(listener: KeyListener, now_s: Callable[[], float]) -> Iterato
     stop = threading.Event()
 
     def read() -> None:
-        keys = Keys()
+        keys = Keys(config)
         while not stop.is_set():
-            for key in _keys_pressed(terminal, REPEAT_S):
+            for key in _keys_pressed(terminal, keys.config.repeat_s):
                 if key == "q":
                     listener.end()
                     return

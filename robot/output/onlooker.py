@@ -28,6 +28,7 @@ from lemtomap.robot.output.viewer import Viewer
 from lemtomap.robot.runs.ending import reason_of
 from lemtomap.types import MapView, Twist
 
+LOOK_PERIOD_S = 0.1  # between two looks at a run: as often as the viewer takes a pose
 RAW_WAITING = 200_000  # calls of both sessions in some ten minutes
 T = TypeVar("T")
 

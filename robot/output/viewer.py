@@ -10,7 +10,6 @@ viewer thread never falls behind. Logging never waits for the disk or the window
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from lemtomap.nav.types import CostmapView
 from lemtomap.robot.devices.parts import DEFAULT_LIMIT, PartFiles
+from lemtomap.robot.output.viewer_config import ViewerConfig
 from lemtomap.robot.output.viewer_layout import ABOUT, EDGE_COLOURS, blueprint
 from lemtomap.robot.output.viewer_pipe import ViewerPipe
 from lemtomap.robot.output.viewer_truth import TruthView
@@ -59,23 +59,6 @@ def _cost_colours() -> NDArray[np.uint8]:
 
 
 COST_COLOURS = _cost_colours()
-
-
-@dataclass(frozen=True)
-class ViewerConfig:
-    """How much the viewer takes; rates in Hz of run time."""
-
-    window_hz: float = 1.0  # 160 kB each before compression; the map changes slower than the robot
-    costmap_hz: float = 0.5  # four bytes a cell
-    pose_hz: float = 10.0  # dimos issue 1509: faster only fills memory
-    scan_hz: float = 2.0  # 8 kB each, which do not compress
-    plan_hz: float = 2.5
-    plot_hz: float = 5.0
-    timing_hz: float = 2.0
-    part_hz: float = 0.2  # how often the file's size is looked at
-    flush_s: float = 2.0  # of wall time between two writes, unless somebody watches: each costs 1 kB a path
-    close_s: float = 3.0  # for the last bytes to reach the file
-    body_m: float = 0.18  # radius of the robot as drawn
 
 
 class Viewer:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from lemtomap import se2
 
 WALL_COLOUR, TRUE_COLOUR, BELIEVED_COLOUR = [150, 156, 166], [67, 170, 139], [249, 132, 74]
-POINT_EVERY_M = 0.15
-TRAIL_PERIOD_S = 3.0
+POINT_EVERY_M = 0.15  # of both trails, as finely as they are seen apart
+TRAIL_PERIOD_S = 3.0  # the whole trail is sent each time
 
 
 class TruthView:

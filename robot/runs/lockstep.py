@@ -33,9 +33,9 @@ def run_lockstep(
     `watch` is called after each step with the virtual time. Same simulator seed, core, mission: same bytes.
     """
     keep = record if record is not None else _forget
-    base_session = RecordedKobukiSession(keep)
+    base_session = RecordedKobukiSession(keep, core.devices.kobuki)
     base = Wire(KOBUKI, simulator.kobuki, base_session, keep, Unplugged)
-    laser = Wire(HOKUYO, simulator.hokuyo, RecordedHokuyoSession(keep), keep, Unplugged)
+    laser = Wire(HOKUYO, simulator.hokuyo, RecordedHokuyoSession(keep, core.devices.hokuyo), keep, Unplugged)
     core.navigation.set_mission(mission)
     core.permit()
     now_ns = round(simulator.now_s * 1e9)

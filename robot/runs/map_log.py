@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +13,20 @@ from numpy.typing import NDArray
 from lemtomap.errors import BadSetting
 from lemtomap.grid import (
     DEFAULT_SLAM,
-    SLAMS,
     GridSlam,
     GrowingGmapping,
-    SlamConfig,
 )
 from lemtomap.pipeline import Mapper
+from lemtomap.robot.build import build_slam, build_topo
+from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.logs import Log, open_log
 from lemtomap.robot.output import files as outputs
 from lemtomap.robot.output.final_map import FinalMap, final_map, map_on_path
 from lemtomap.robot.output.overview import Overview, WallSketch, draw
 from lemtomap.robot.output.progress import Bar, first_use
-from lemtomap.topo.config import TopoConfig
+from lemtomap.robot.settings.read import read_settings
+from lemtomap.robot.settings.tree import to_mapping
 from lemtomap.topo.file.store import TopoStore
-from lemtomap.topo.loops import LoopRecogniser
-from lemtomap.topo.mapper import TopoMapper
 from lemtomap.types import (
     EdgeType,
     GridView,
@@ -49,9 +48,7 @@ class MapLogOptions:
     log: Path
     out: Path
     slam: str = DEFAULT_SLAM
-    particles: int | None = None
-    window_m: float = 20.0
-    max_range_m: float | None = None
+    config: RobotConfig = field(default_factory=RobotConfig)
     seed: int = 0
     field_of_view_deg: float | None = None
     """What the laser of a CARMEN log covers, whatever the log says."""
@@ -61,14 +58,28 @@ class MapLogOptions:
         told = self.field_of_view_deg
         return open_log(self.log, None if told is None else math.radians(told))
 
-    def slam_config(self) -> SlamConfig:
-        """Return the metric layer's settings; raises BadSetting when they cannot work."""
-        if self.slam == "window" and self.particles not in (None, 1):
-            raise BadSetting(f"particles {self.particles}: --slam window follows one pose only")
-        default = PARTICLES.get(self.slam, SlamConfig().particles)
-        return SlamConfig(
-            particles=self.particles or default, window_m=self.window_m, max_range_m=self.max_range_m
-        )
+
+def chosen(
+    slam: str,
+    config: Path | None,
+    orders: Sequence[str],
+    particles: int | None = None,
+    window_m: float | None = None,
+    max_range_m: float | None = None,
+) -> RobotConfig:
+    """Return the settings of a file, the command line and this metric layer. Raises BadSetting."""
+    options = {
+        "--particles": ("slam.particles", particles),
+        "--window": ("slam.window_m", window_m),
+        "--max-range": ("slam.max_range_m", max_range_m),
+    }
+    read = read_settings(config, orders, options=options)
+    if slam == "window" and particles not in (None, 1):
+        raise BadSetting(f"--particles {particles}: --slam window follows one pose only")
+    usual = PARTICLES.get(slam)
+    if usual is None or (("slam", "particles") in read.sources and slam != "window"):
+        return read.config
+    return replace(read.config, slam=replace(read.config.slam, particles=usual))
 
 
 @dataclass(slots=True)
@@ -113,18 +124,16 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
     Raises BadLog, BadSetting; then nothing is left behind.
     """
     begun_s, begun_cpu_s = time.perf_counter(), time.process_time()
-    config = options.slam_config()
+    config = options.config
     log = options.open_log()
     for remark in log.remarks:
         bar.say(f"{log.path}: {remark}")
     read_cpu_s = time.process_time() - begun_cpu_s
     with outputs.staged(options.out) as stage:
-        grid = SLAMS[options.slam](config, options.seed)
+        grid = build_slam(options.slam, config, options.seed)
         slam = _Timed(grid)
         store = TopoStore.create(stage / "map.lemto", durable=False)
-        # the growing grid closes its own loops and is far too large to search
-        recogniser = None if options.slam == "gmapping" else LoopRecogniser()
-        topo = TopoMapper(TopoConfig(), store, recogniser=recogniser)
+        topo = build_topo(options.slam, config, store)
         try:
             with first_use(bar):
                 drive = _drive(log, Mapper(lambda: slam, topo, watched=False), slam, bar)
@@ -132,7 +141,7 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
             view = topo.view()
         finally:
             topo.close()
-        summary = _summary(options, config, drive, final)
+        summary = _summary(options, drive, final)
         if log.has_clock:
             summary["log_s"] = _span_s(drive.stamps_s)
         summary["map_bytes"] = outputs.file_bytes(stage / "map.lemto")
@@ -186,7 +195,7 @@ def _drive(log: Log, mapper: Mapper, slam: _Timed, bar: Bar) -> _Drive:
     return drive
 
 
-def _summary(options: MapLogOptions, config: SlamConfig, drive: _Drive, final: FinalMap) -> dict[str, Any]:
+def _summary(options: MapLogOptions, drive: _Drive, final: FinalMap) -> dict[str, Any]:
     """Return the figures of the map, in the order a person asks for them."""
     edges = final.edges_by_type()
     return {
@@ -198,7 +207,8 @@ def _summary(options: MapLogOptions, config: SlamConfig, drive: _Drive, final: F
         "edges": edges,
         "loop_closures": edges[EdgeType.LOOP_CLOSING.value],
         "seed": options.seed,
-        "config": {"slam": options.slam, **asdict(config)},
+        "slam": options.slam,
+        "config": to_mapping(options.config),
         "versions": outputs.versions(),
     }
 
@@ -215,8 +225,8 @@ def _overview(
         *(f"edges       {count:,} {kind.replace('_', ' ')}" for kind, count in summary["edges"].items()),
         f"map file    {summary['map_bytes'] / 1000:,.0f} kB",
         f"CPU         {drive.grid_cpu_s:.1f} s grid, {drive.topo_cpu_s:.1f} s topological",
-        f"settings    --slam {options.slam} --particles {summary['config']['particles']}",
-        f"            --window {options.window_m:g} --seed {options.seed}",
+        f"settings    --slam {options.slam} --particles {options.config.slam.particles}",
+        f"            --window {options.config.slam.window_m:g} --seed {options.seed}",
     ]
     return Overview(
         T_map_node=final.T_map_node,

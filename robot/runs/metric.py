@@ -11,13 +11,13 @@ from lemtomap.baseline.whole_grid import GRID_ID
 from lemtomap.errors import BadSetting
 from lemtomap.nav.types import Goal, NavState
 from lemtomap.robot.baseline import build_metric_core
-from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.exchange import MissionState
 from lemtomap.robot.missions.missions import MissionInput, Order
 from lemtomap.robot.output import files as outputs
 from lemtomap.robot.output.progress import Bar
 from lemtomap.robot.runs.lockstep import run_lockstep
 from lemtomap.robot.runs.run import Teller
+from lemtomap.robot.runs.sim_server import mounting_of
 from lemtomap.robot.runs.simulated import SimOptions, truth_of
 from lemtomap.sim import worlds
 from lemtomap.sim.simulator import Simulator
@@ -80,9 +80,9 @@ def run_metric(options: SimOptions, bar: Bar) -> dict[str, Any]:
         raise BadSetting("--nav metric: the baseline runs on the virtual clock only; add --fast")
     if options.out.exists() and not options.out.is_dir():
         raise BadSetting(f"{options.out}: is a file; --out needs a folder")
-    simulator = Simulator(world, options.seed, gui=options.gui)
-    config = RobotConfig()
-    core = build_metric_core(config, grid_of(world), world.spawn, seed=options.seed)
+    mounting = mounting_of(options.config)
+    simulator = Simulator(world, options.seed, gui=options.gui, mounting=mounting)
+    core = build_metric_core(options.config, grid_of(world), world.spawn, seed=options.seed)
     begun_s = time.perf_counter()
     try:
         ended = run_lockstep(

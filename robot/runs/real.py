@@ -3,17 +3,15 @@
 import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from serial.tools import list_ports
-
 from lemtomap.drivers.port import BytePort, open_serial
 from lemtomap.errors import BadSetting
 from lemtomap.grid import DEFAULT_SLAM
-from lemtomap.robot.config import PortsConfig, RobotConfig, load
+from lemtomap.robot.config import PortsConfig, RobotConfig
 from lemtomap.robot.devices import ports
 from lemtomap.robot.devices.parts import DEFAULT_LIMIT
 from lemtomap.robot.missions.missions import parse_mission
@@ -29,15 +27,13 @@ from lemtomap.topo.file.store import TopoStore
 
 @dataclass(frozen=True, slots=True)
 class RobotOptions:
-    """What the user asked for; None: the default, or what the configuration file says."""
+    """What the user asked for; None: the default."""
 
     mission: str
     duration_s: float
-    kobuki: str | None = None
-    hokuyo: str | None = None
+    config: RobotConfig = field(default_factory=RobotConfig)
     map_path: Path | None = None
     out: Path | None = None
-    config: Path | None = None
     seed: int = 0
     slam: str = DEFAULT_SLAM
     by_hand: bool = False
@@ -51,9 +47,8 @@ def run_robot(options: RobotOptions, bar: Bar) -> dict[str, Any]:
 
     Raises BadSetting, BadMap, PortError and WrongDevice before anything moves; then nothing is left behind.
     """
-    config = load(options.config, list_ports.comports) if options.config else RobotConfig()
     mission = parse_mission(options.mission)
-    found = find_ports(config.ports, options)
+    found = find_ports(options.config.ports)
     asyncio.run(_try(found))
     out = options.out or Path("runs") / datetime.now(UTC).astimezone().strftime("%Y-%m-%d_%H-%M-%S")
     plan = RunPlan(
@@ -62,7 +57,7 @@ def run_robot(options: RobotOptions, bar: Bar) -> dict[str, Any]:
         title=f"{out.name}: {options.mission}",
         seed=options.seed,
         slam=options.slam,
-        config=replace(config, ports=found),
+        config=replace(options.config, ports=found),
         live=has_display(),
         record_limit=options.record_limit,
         facts={"mission": options.mission, "kobuki": found.kobuki, "hokuyo": found.hokuyo},
@@ -85,13 +80,14 @@ def _hands(options: RobotOptions, runtime: Runtime) -> AbstractContextManager[No
     def change_level(level: int) -> None:
         core.exchange.nav_events.put(LevelChanged(level))
 
-    return driven_by_hand(KeyListener(core.base.teleop, change_level, runtime.stop.set), runtime.clock.now_s)
+    listener = KeyListener(core.base.teleop, change_level, runtime.stop.set)
+    return driven_by_hand(listener, runtime.clock.now_s, options.config.teleop)
 
 
-def find_ports(config: PortsConfig, options: RobotOptions) -> PortsConfig:
-    """Return both ports: as given, as configured, else by USB identity. Raises PortMissing, BadSetting."""
-    kobuki = options.kobuki or config.kobuki or ports.find(ports.KOBUKI)
-    hokuyo = options.hokuyo or config.hokuyo or ports.find(ports.HOKUYO)
+def find_ports(config: PortsConfig) -> PortsConfig:
+    """Return both ports: as configured, else by USB identity. Raises PortMissing, BadSetting."""
+    kobuki = config.kobuki or ports.find(ports.KOBUKI)
+    hokuyo = config.hokuyo or ports.find(ports.HOKUYO)
     if kobuki == hokuyo:
         raise BadSetting(f"{kobuki}: given for both devices")
     return PortsConfig(kobuki, hokuyo)

@@ -1,15 +1,17 @@
 """`lemtomap replay`: a recorded run's bytes through the same drivers once more, mapped anew."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lemtomap.errors import BadLog, BadSetting
 from lemtomap.grid import DEFAULT_SLAM
-from lemtomap.robot.config import RobotConfig, from_mapping
+from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.devices.recorded import Recording
 from lemtomap.robot.devices.replay import replay_map
 from lemtomap.robot.exchange import Ended, MissionState
+from lemtomap.robot.output.onlooker import LOOK_PERIOD_S
 from lemtomap.robot.output.progress import Bar
 from lemtomap.robot.runs.run import (
     Run,
@@ -17,12 +19,26 @@ from lemtomap.robot.runs.run import (
     Stopped,
     Teller,
 )
+from lemtomap.robot.settings.check import from_mapping
+from lemtomap.robot.settings.read import read_settings
 
-LOOK_PERIOD_S = 0.1
+UNTOLD = "the recording does not tell the run's settings"
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class Changes:
+    """What shall be otherwise than in the run; None: as it was."""
+
+    slam: str | None = None
+    seed: int | None = None
+    file: Path | None = None
+    """Settings instead of those that the run recorded, ..."""
+    orders: tuple[str, ...] = ()
+    """... and single ones over either of them, `KEY=VALUE`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaySettings:
     """How a recording is mapped."""
 
     slam: str
@@ -33,17 +49,15 @@ class Settings:
     why_not: str = ""
 
 
-def replay_run(
-    run: Path, out: Path, bar: Bar, *, slam: str | None = None, seed: int | None = None
-) -> dict[str, Any]:
+def replay_run(run: Path, out: Path, bar: Bar, changes: Changes | None = None) -> dict[str, Any]:
     """Map the recording and leave the usual files; return the summary. Raises BadLog, BadSetting.
 
-    None: as the run did.
+    It is mapped as in the run, with the settings recorded there, but for `changes`.
     """
     recording = Recording.open(run)
     if out.resolve() in {recording.path.parent.resolve(), recording.path.resolve().parent}:
         raise BadSetting(f"{out}: holds the recording itself; give another --out")
-    settings = settings_for(recording, slam, seed)
+    settings = settings_for(recording, changes)
     plan = RunPlan(
         out=out,
         map_path=out / "map.lemto",
@@ -81,28 +95,37 @@ def replay_run(
     return again.summary
 
 
-def settings_for(recording: Recording, slam: str | None, seed: int | None) -> Settings:
-    """Return how to map: as the run did, where it says so and nothing else is asked for."""
-    about = recording.about
+def settings_for(recording: Recording, changes: Changes | None = None) -> ReplaySettings:
+    """Return how to map: as the run did, where it says so and nothing else is asked. Raises BadSetting."""
+    asked, about = changes or Changes(), recording.about
     then_slam, then_seed = about.get("slam"), about.get("seed")
-    known = isinstance(then_slam, str) and isinstance(then_seed, int)
-    try:
-        config = from_mapping(about["config"]) if known else RobotConfig()
-    except (BadSetting, KeyError, TypeError, ValueError):
-        known, config = False, RobotConfig()
-    used_slam = slam if slam is not None else then_slam if known else DEFAULT_SLAM
-    used_seed = seed if seed is not None else then_seed if known else 0
-    why_not = ""
-    if not known:
-        why_not = "the recording does not tell the run's settings"
-    elif (used_slam, used_seed) != (then_slam, then_seed):
+    then, unknown = _recorded_config(about)
+    if not (isinstance(then_slam, str) and isinstance(then_seed, int)):
+        then_slam, then_seed, then, unknown = DEFAULT_SLAM, 0, RobotConfig(), UNTOLD
+    slam = asked.slam if asked.slam is not None else then_slam
+    seed = asked.seed if asked.seed is not None else then_seed
+    config = read_settings(asked.file, asked.orders, base=then).config
+    why_not = unknown
+    if asked.file is not None:
+        why_not = f"with the settings of {asked.file}, not the run's own"
+    elif (slam, seed, config) != (then_slam, then_seed, then):
         why_not = "mapped with other settings than the run's"
-    elif not about.get("new_map"):
+    elif not why_not and not about.get("new_map"):
         why_not = "the run went on with a map, the replay begins a new one"
-    return Settings(str(used_slam), int(used_seed or 0), config, not why_not, why_not)
+    return ReplaySettings(slam, seed, config, not why_not, why_not)
 
 
-def _told(recording: Recording, settings: Settings) -> str:
+def _recorded_config(about: Mapping[str, Any]) -> tuple[RobotConfig, str]:
+    """Return the settings that the run recorded, else the defaults and why."""
+    try:
+        return from_mapping(about["config"]), ""
+    except KeyError:
+        return RobotConfig(), UNTOLD
+    except BadSetting as error:  # of another version
+        return RobotConfig(), f"with the defaults, for the run's settings cannot be used: {error}"
+
+
+def _told(recording: Recording, settings: ReplaySettings) -> str:
     """Return what became of it, in a line."""
     missing = recording.told_gaps()
     if missing:

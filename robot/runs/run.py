@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from lemtomap.robot.build import build_core
-from lemtomap.robot.config import RobotConfig, to_mapping
+from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.core import RobotCore
 from lemtomap.robot.devices.parts import DEFAULT_LIMIT, parts_of
 from lemtomap.robot.devices.recording import HOKUYO, KOBUKI
@@ -30,6 +30,7 @@ from lemtomap.robot.runs.run_files import (
     RecordPlan,
     RunFiles,
 )
+from lemtomap.robot.settings.tree import to_mapping
 
 QUIET_S = 15.0  # of run time before nearly the same line is said again
 
@@ -117,7 +118,7 @@ class Run:
                 self._spaces,
                 self.core,
                 self._teller,
-                RecordPlan(plan.title, recorded, plan.record_limit, plan.live, plan.config.body.radius_m),
+                RecordPlan(plan.title, recorded, plan.record_limit, plan.live, plan.config.viewer),
             )
         except BaseException:
             self.core.close()
@@ -179,9 +180,7 @@ class Run:
             ended = replace(ended, state=MissionState.FAILED, text=faults[0])
         told = {**plan.facts, "result": ended.state.value, "result_text": ended.text, **self._truth}
         told |= {"interrupted": ended.interrupted, "faults": faults}
-        config = {"slam": plan.slam, **_settings(plan)["config"]}
-        settings = {"seed": plan.seed, "config": config}
-        self.summary = self.files.finish(ended.now_s, told, settings, whole_drive=self._new_map)
+        self.summary = self.files.finish(ended.now_s, told, _settings(plan), whole_drive=self._new_map)
 
     def _missing(self) -> str:
         """Return which device never measured anything, empty when both did."""

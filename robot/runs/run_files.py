@@ -20,13 +20,13 @@ from lemtomap.robot.output.final_map import FinalMap, final_map
 from lemtomap.robot.output.onlooker import Onlooker
 from lemtomap.robot.output.overview import Overview, WallSketch, draw
 from lemtomap.robot.output.preview import draw_preview
-from lemtomap.robot.output.viewer import Viewer, ViewerConfig
+from lemtomap.robot.output.viewer import Viewer
+from lemtomap.robot.output.viewer_config import ViewerConfig
 from lemtomap.robot.runs.ending import Ending, reason_of
 from lemtomap.robot.runs.folder import RunFolder, Space
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, MapView
 
-PREVIEW_PERIOD_S = 15.0
 WALLS_PERIOD_S = 0.5  # of the scans that draw the walls in the picture
 FOLDER_PERIOD_S = 1.0  # of wall time between two looks at the folder and its disk
 RECORDINGS = ("run.rrd", "run.mcap")
@@ -56,8 +56,7 @@ class RecordPlan:
     about: Mapping[str, Any] = field(default_factory=dict)
     limit_bytes: int = DEFAULT_LIMIT
     live: bool = False
-    body_m: float = 0.18
-    """Radius of the robot as drawn."""
+    viewer: ViewerConfig = field(default_factory=ViewerConfig)
 
 
 @dataclass(slots=True)
@@ -86,7 +85,8 @@ class RunFiles(Onlooker):
         self._title, self._core, self._listener = record.title, core, listener
         self._begun = _Clock()
         self._walls = WallSketch()
-        self._walls_due_s, self._preview_due_s, self._folder_due_s = 0.0, PREVIEW_PERIOD_S, 0.0
+        self._preview_s = record.viewer.preview_s
+        self._walls_due_s, self._preview_due_s, self._folder_due_s = 0.0, record.viewer.preview_s, 0.0
         self._truth: Callable[[], Pose | None] | None = None
         self._scarce = ""
         self._space_lock = threading.Lock()
@@ -97,7 +97,7 @@ class RunFiles(Onlooker):
             folder.path / "run.rrd",
             lambda text: self.warn("viewer", text),
             live=record.live,
-            config=ViewerConfig(body_m=record.body_m),
+            config=record.viewer,
             limit_bytes=record.limit_bytes,
         )
         self._viewer = self._view
@@ -117,7 +117,7 @@ class RunFiles(Onlooker):
         if view is not None and true is not None and self._viewer is not None:
             self._view.show_truth(now_s, true, view.T_grid_base)
         if view is not None and now_s >= self._preview_due_s:
-            self._preview_due_s = now_s + PREVIEW_PERIOD_S
+            self._preview_due_s = now_s + self._preview_s
             self._preview(view)
         if scan is not None and now_s >= self._walls_due_s:
             self._walls_due_s = now_s + WALLS_PERIOD_S

@@ -35,13 +35,12 @@ from lemtomap.robot.devices.recording import (
 from lemtomap.robot.devices.wire import RecordedHokuyoSession, RecordedKobukiSession
 from lemtomap.robot.exchange import Ended, MissionState, NoteLevel
 from lemtomap.robot.missions.missions import Mission
-from lemtomap.robot.output.onlooker import Onlooker
+from lemtomap.robot.output.onlooker import LOOK_PERIOD_S, Onlooker
 from lemtomap.robot.runs.interrupts import on_interrupt
 
 OUTPUT_PERIOD_S = 0.02  # design, section 4
 SHORTEST_NAP_S = 0.001
 LONGEST_NAP_S = 0.025  # a packet comes every 20 ms, now and then a little later
-LOOK_PERIOD_S = 0.1
 SETTLE_S = 1.0  # after a mission: the last scans, a standing robot
 JOIN_S = 5.0
 SWITCH_S = (
@@ -69,12 +68,11 @@ class Runtime:
         self.stop = threading.Event()
         """Set it from any thread to end the run."""
         record = onlooker.raw.put
-        self._kobuki = KobukiDriver(
-            ports.kobuki, self.clock.now_s, self._on_base, RecordedKobukiSession(record)
-        )
-        self._hokuyo = HokuyoDriver(
-            ports.hokuyo, self.clock.now_s, self._on_laser, RecordedHokuyoSession(record)
-        )
+        devices, now_s = core.devices, self.clock.now_s
+        base = RecordedKobukiSession(record, devices.kobuki)
+        laser = RecordedHokuyoSession(record, devices.hokuyo)
+        self._kobuki = KobukiDriver(ports.kobuki, now_s, self._on_base, base, devices.waiting)
+        self._hokuyo = HokuyoDriver(ports.hokuyo, now_s, self._on_laser, laser, devices.waiting)
         self._base_events: list[KobukiEvent] = []
         self._laser_events: list[HokuyoEvent] = []
         self._lost: list[str] = []

@@ -11,9 +11,17 @@ from typing import Any, Self
 
 from lemtomap.errors import BadInput
 from lemtomap.robot.child import python
+from lemtomap.robot.config import RobotConfig
 from lemtomap.se2 import Pose, pose
+from lemtomap.sim.mounting import Mounting
 
 END_S = 5.0  # for the server to tell the truth and go
+
+
+def mounting_of(config: RobotConfig) -> Mounting:
+    """Return where the simulated laser sits, so that the robot's settings are true of it."""
+    laser = config.laser
+    return Mounting((laser.x_m, laser.y_m, laser.yaw_rad), upside_down=laser.is_upside_down)
 
 
 @dataclass(slots=True)
@@ -24,6 +32,7 @@ class FakeHardware:
     seed: int = 0
     gui: bool = False
     """Open pybullet's own window."""
+    mounting: Mounting = field(default_factory=Mounting)
     kobuki: str = ""
     hokuyo: str = ""
     truth: dict[str, Any] = field(default_factory=dict)
@@ -35,6 +44,8 @@ class FakeHardware:
         """Start the server; raises BadInput with the server's own line when it cannot."""
         command = python("-m", "lemtomap.sim.serve", "--world", self.world, "--seed", str(self.seed))
         command += ["--parent", str(os.getpid())] + ["--gui"] * self.gui
+        command += ["--laser=" + ",".join(str(value) for value in self.mounting.T_base_laser)]
+        command += ["--upside-down"] * self.mounting.upside_down
         self._folder = tempfile.TemporaryDirectory(prefix="lemtomap-")
         command += ["--truth", str(self._truth_path)]
         with tempfile.TemporaryFile("w+") as errors:

@@ -1,6 +1,6 @@
 """`lemtomap sim`: the whole robot in a simulated building, in lock-step or in real time."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from lemtomap.robot.devices.parts import DEFAULT_LIMIT
 from lemtomap.robot.missions.missions import parse_mission
 from lemtomap.robot.missions.places import mission_from
 from lemtomap.robot.output.display import has_display
+from lemtomap.robot.output.onlooker import LOOK_PERIOD_S
 from lemtomap.robot.output.progress import Bar, first_use
 from lemtomap.robot.runs.lockstep import run_lockstep
 from lemtomap.robot.runs.run import (
@@ -23,14 +24,12 @@ from lemtomap.robot.runs.run import (
     Teller,
 )
 from lemtomap.robot.runs.runtime import Ports, Runtime
-from lemtomap.robot.runs.sim_server import FakeHardware
+from lemtomap.robot.runs.sim_server import FakeHardware, mounting_of
 from lemtomap.robot.runs.warmup import warm_up
 from lemtomap.sim import worlds
 from lemtomap.sim.picture import outlines
 from lemtomap.sim.simulator import Simulator
 from lemtomap.topo.file.store import TopoStore
-
-LOOK_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +51,8 @@ class SimOptions:
     """Carry the simulated depth camera, too."""
     record_limit: int = DEFAULT_LIMIT
     """Bytes of each recording."""
+    config: RobotConfig = field(default_factory=RobotConfig)
+    """The robot's settings; the simulated laser sits where they say."""
 
 
 def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
@@ -70,7 +71,7 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
         title=f"{Path(options.world).stem}: {options.mission}",
         seed=options.seed,
         slam=options.slam,
-        config=RobotConfig(),
+        config=options.config,
         live=options.live and has_display(),
         record_limit=options.record_limit,
         replace=True,
@@ -88,7 +89,8 @@ def run_sim(options: SimOptions, bar: Bar) -> dict[str, Any]:
 
 def _drive_fast(options: SimOptions, run: Run) -> None:
     """Run in lock-step on a virtual clock."""
-    simulator = Simulator(worlds.load(options.world), options.seed, gui=options.gui)
+    mounting = mounting_of(options.config)
+    simulator = Simulator(worlds.load(options.world), options.seed, gui=options.gui, mounting=mounting)
     run.files.show_world(outlines(simulator.world), lambda: simulator.truth().T_world_base)
     look_at_s = 0.0
     camera = camera_of(simulator, run.core) if options.depth else None
@@ -127,7 +129,8 @@ def truth_of(simulator: Simulator) -> dict[str, Any]:
 
 def _drive_in_real_time(options: SimOptions, run: Run) -> None:
     """Run on the wall clock, the simulator in a process of its own behind pseudo-terminals."""
-    with FakeHardware(options.world, options.seed, gui=options.gui) as hardware:
+    mounting = mounting_of(options.config)
+    with FakeHardware(options.world, options.seed, gui=options.gui, mounting=mounting) as hardware:
         run.files.show_world(outlines(worlds.load(options.world)), hardware.true_pose)
         ports = Ports(lambda: open_serial(hardware.kobuki), lambda: open_serial(hardware.hokuyo))
         runtime = Runtime(run.core, ports, run.files)

@@ -29,7 +29,7 @@ from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
 from lemtomap.topo.loops.places import LocalSubmap
 from lemtomap.types import Odometry, Scan
 
-STEP_M, TURN_RAD, SCAN_S = 0.4, 0.5, 0.1
+STEP_M, TURN_RAD, SCAN_S = 0.4, 0.5, 0.1  # a drive that calls every kernel in few scans
 ASIDE_M = 0.7  # of the middle: on its way back the robot makes nodes of its own beside the first ones
 WAY_M = 14.0  # beyond what the first window holds, and the way after which places are measured again
 WALLS = np.array(
@@ -44,7 +44,7 @@ WALLS = np.array(
         (-3.0, -1.5, -3.0, 1.5),
     ]
 )
-BEAMS, FIRST_RAD = 682, -2.0862138
+BEAMS, FIRST_RAD = 682, -2.0862138  # a URG-04LX
 LOST_SCANS = 40
 NAVIGATES_EACH, BUMPED_AT = 4, 20  # scans
 
@@ -56,7 +56,7 @@ def warm_up(config: RobotConfig, slam: str = DEFAULT_SLAM) -> None:
         way = _there_and_back()
         for poses in (way, way[:LOST_SCANS]):
             core = build_core(config, path, slam=slam, durable=False)
-            core.navigation.set_mission(Explore(config.nav))
+            core.navigation.set_mission(Explore())
             for index, T_world_base in enumerate(poses):
                 before = way[max(0, index - 1)]
                 turns = index % NAVIGATES_EACH == 0

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from lemtomap.odometry import (
-    MotionNoise,
     NotCovered,
     OdometryBuffer,
     OdometryConfig,
@@ -92,11 +91,3 @@ def test_buffer_says_what_it_does_not_cover(stamp_s):
     assert not buffer.covers(stamp_s)
     with pytest.raises(NotCovered, match=r"covers 19\.000 to 19\.980 s"):
         buffer.at([19.5, stamp_s])
-
-
-def test_covariance_grows_with_every_kind_of_motion_and_stays_a_covariance():
-    noise = MotionNoise()
-    for motion in [(1.0, 0.0, 3.0), (0.0, 2.0, 4.0), (0.0, 0.0, 60.0), (3.0, 1.0, 9.0)]:
-        small, large = noise.covariance(*motion), noise.covariance(*(2 * part for part in motion))
-        assert np.all(np.linalg.eigvalsh(small) >= 0)
-        assert np.trace(large) > np.trace(small)

@@ -27,6 +27,7 @@ def test_the_names_of_the_public_face_are_pinned():
         "Mapper",
         "Navigator",
         "NoRoute",
+        "NotStarted",
         "Odometry",
         "Scan",
         "Twist",

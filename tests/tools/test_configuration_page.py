@@ -2,26 +2,11 @@
 
 import dataclasses
 import tomllib
-import typing
 
-from lemtomap.robot.config import RobotConfig, from_mapping
+from lemtomap.robot.settings.check import from_mapping
+from lemtomap.robot.settings.tree import all_settings, notes_of
 from lemtomap.settings import within
-from tools.configuration_page import (
-    HEAD,
-    PAGE,
-    notes_of,
-    page,
-)
-
-
-def keys(cls, table=()):
-    """Yield (table, key) of everything that can be set."""
-    hints = typing.get_type_hints(cls)
-    for field in dataclasses.fields(cls):
-        if dataclasses.is_dataclass(hints[field.name]):
-            yield from keys(hints[field.name], (*table, field.name))
-        else:
-            yield ".".join(table), field.name
+from tools.configuration_page import HEAD, PAGE, page
 
 
 def test_the_page_is_current():
@@ -30,7 +15,8 @@ def test_the_page_is_current():
 
 def test_every_key_stands_in_its_table():
     tables = {part.partition("]")[0]: part for part in page().split("\n## [")[1:]}
-    missing = [(table, key) for table, key in keys(RobotConfig) if f"\n| `{key}` |" not in tables[table]]
+    keys = [(".".join(key[:-1]), key[-1]) for key in all_settings()]
+    missing = [(table, key) for table, key in keys if f"\n| `{key}` |" not in tables[table]]
     assert missing == []
 
 

@@ -23,7 +23,7 @@ from lemtomap.topo.events import GroundSeen
 from lemtomap.types import RouteGraph
 
 SIDE = 48
-CELL_M = 0.25
+CELL_M = 0.25  # as the map file stores it
 TAKEN_WITHIN_M = 3.0
 """A node's picture is taken while the robot is this near: the window then knows its surroundings best."""
 STAMP_M = 0.35

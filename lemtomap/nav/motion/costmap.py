@@ -16,9 +16,6 @@ from lemtomap.nav.types import CostmapView, ObstacleSighting, Points
 from lemtomap.se2 import Pose
 from lemtomap.types import GridView
 
-TIGHT_COST = 25.0
-"""Price of a cell inside the body's margin, open only to leave it."""
-
 
 @dataclass(frozen=True, slots=True)
 class Costs:
@@ -106,10 +103,7 @@ class Felt:
     """Around these a wide berth is better, but none is not forbidden."""
 
 
-DEAR_EDGE_M = 0.2
-"""Over this much the price of what lies beside a touched thing falls off."""
 BESIDE = 2  # cells, 0.1 m: a leg is no wider at the camera's height than at the laser's
-AGO_S = 0.5
 
 
 class LiveLayer:
@@ -189,7 +183,7 @@ class Costmap:
             for r, c in ((r, c) for r in range(-BESIDE, BESIDE + 1) for c in range(-BESIDE, BESIDE + 1)):
                 at = np.clip(rows + r, 0, height - 1), np.clip(cols + c, 0, width - 1)
                 scanned |= (layer.hits[at] >= self._config.live_hits) & (
-                    now_s - layer.last_hit_s[at] <= AGO_S
+                    now_s - layer.last_hit_s[at] <= self._config.agree_s
                 )
         return scanned
 
@@ -248,11 +242,11 @@ class Costmap:
         for x, y in felt.dear_grid:
             row, col = (y - origin_m[1]) / res, (x - origin_m[0]) / res
             flat = (self._body.radius_m + config.contact_wide_m) / res
-            kernels.raise_cost(cost, row, col, flat, flat + DEAR_EDGE_M / res, config.contact_price)
+            kernels.raise_cost(cost, row, col, flat, flat + config.contact_edge_m / res, config.contact_price)
         costs = Costs(now_s, res, origin_m, state, clearance, cost)
         row, col = costs.cell(p_robot_grid)
         if costs.holds(p_robot_grid) and np.isinf(cost[int(row), int(col)]):
-            kernels.open_start(cost, clearance, row, col, 0.30 / res, TIGHT_COST)
+            kernels.open_start(cost, clearance, row, col, 0.30 / res, config.tight_price)
         return costs if half_m is None else costs.part(_square(grid, p_robot_grid, half_m), part)
 
     def _state(self, grid: GridView, part: tuple[slice, slice], now_s: float) -> NDArray[np.uint8]:

@@ -11,15 +11,6 @@ from lemtomap.nav.motion.metric import MetricPlan
 from lemtomap.se2 import Pose
 from lemtomap.types import Twist
 
-TIGHTEST_M = 0.10
-"""With an obstacle this near to the axle the map is wrong or the robot is: stand still."""
-
-
-CREEP_MPS = 0.06
-HELD_MPS = 0.03
-NEAR_M = 1.3
-"""This near to where it stops, the robot looks at the spot itself and no longer at the way ahead."""
-
 
 @dataclass(frozen=True, slots=True)
 class ArcEnd:
@@ -27,9 +18,9 @@ class ArcEnd:
 
     to_go_m: float
 
-    def v_cap_mps(self, braking_mps2: float) -> float:
+    def v_cap_mps(self, braking_mps2: float, creep_mps: float) -> float:
         """Return the speed from which half the braking limit still stops at the target."""
-        return max(CREEP_MPS, float(np.sqrt(braking_mps2 * max(0.0, self.to_go_m - 0.03))))
+        return max(creep_mps, float(np.sqrt(braking_mps2 * max(0.0, self.to_go_m - 0.03))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +46,7 @@ def choose_twist(
     if not plan.costs.holds(T_grid_base):
         return Choice(None, 0)
     choice = _choose(plan, T_grid_base, twist, ending, body, dwa, body.radius_m + dwa.margin_m)
-    if choice.twist is None or choice.twist.v_mps < HELD_MPS:
+    if choice.twist is None or choice.twist.v_mps < dwa.held_mps:
         bare = _choose(plan, T_grid_base, twist, ending, body, dwa, body.radius_m)
         return choice if bare.twist is None else bare
     return choice
@@ -72,11 +63,11 @@ def _choose(
 ) -> Choice:
     costs = plan.costs
     row, col = costs.cell(T_grid_base)
-    near = ending is not None and ending.to_go_m < NEAR_M
-    v_cap_mps = body.v_max_mps if ending is None else ending.v_cap_mps(body.braking_mps2)
+    near = ending is not None and ending.to_go_m < dwa.near_m
+    v_cap_mps = body.v_max_mps if ending is None else ending.v_cap_mps(body.braking_mps2, dwa.creep_mps)
     vs, ws = velocity_window(twist, v_cap_mps, body, dwa)
     here_m = float(costs.clearance[int(row), int(col)]) * costs.resolution_m
-    body_m = min(keep_m, max(TIGHTEST_M, here_m - 0.1 * costs.resolution_m))
+    body_m = min(keep_m, max(dwa.tightest_m, here_m - 0.1 * costs.resolution_m))
     scores = np.empty((vs.size, ws.size))
     best = kernels.score_trajectories(
         plan.field, costs.cost, costs.clearance, costs.resolution_m, row, col, float(T_grid_base[2]),

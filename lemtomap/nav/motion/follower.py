@@ -7,7 +7,6 @@ import numpy as np
 
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.motion.dwa import (
-    HELD_MPS,
     ArcEnd,
     approach,
     choose_twist,
@@ -15,14 +14,6 @@ from lemtomap.nav.motion.dwa import (
 from lemtomap.nav.motion.metric import MetricPlan
 from lemtomap.se2 import Pose, wrap_angle
 from lemtomap.types import Twist
-
-LOOK_M = 0.40
-"""The way's direction is read this far along it."""
-MOVING_MPS = 0.10
-MOVING_TURN_RAD = 1.9
-"""A robot under way bends round rather than stops, unless the way leads back."""
-HELD_TURN_RAD = 0.15
-"""A robot that no arc lets forward faces its way first."""
 
 
 class FollowerState(StrEnum):
@@ -62,13 +53,14 @@ class Follower:
         target is a node to pass, where the robot does not slow down.
         """
         config, body = self._config, self._config.body
-        heading_off = way_heading_off(plan, T_grid_base)
+        follow, held_mps = config.follow, config.dwa.held_mps
+        heading_off = way_heading_off(plan, T_grid_base, follow.look_m)
         if self._must_turn(heading_off, twist):
             return Step(turn_in_place(heading_off, twist, config), FollowerState.TURN)
         ending = None if end_m is None else ArcEnd(end_m)
         choice = choose_twist(plan, T_grid_base, twist, ending, body, config.dwa)
-        held = choice.twist is None or choice.twist.v_mps < HELD_MPS
-        if held and abs(heading_off) > HELD_TURN_RAD and twist.v_mps < HELD_MPS:
+        held = choice.twist is None or choice.twist.v_mps < held_mps
+        if held and abs(heading_off) > follow.held_turn_rad and twist.v_mps < held_mps:
             return Step(turn_in_place(heading_off, twist, config), FollowerState.TURN)
         if choice.twist is None:
             return Step(approach(twist, Twist(0.0, 0.0), body, config.period_s), FollowerState.STUCK)
@@ -90,18 +82,19 @@ class Follower:
         return Step(slower, FollowerState.THERE if resting else FollowerState.DRIVE)
 
     def _must_turn(self, heading_off: float, twist: Twist) -> bool:
-        config = self._config
-        start = MOVING_TURN_RAD if abs(twist.v_mps) > MOVING_MPS else config.turn_start_rad
+        config, follow = self._config, self._config.follow
+        moving = abs(twist.v_mps) > follow.moving_mps
+        start = follow.moving_turn_rad if moving else config.turn_start_rad
         limit = config.turn_end_rad if self._turning else start
         self._turning = abs(heading_off) > limit
         return self._turning
 
 
-def way_heading_off(plan: MetricPlan, T_grid_base: Pose) -> float:
+def way_heading_off(plan: MetricPlan, T_grid_base: Pose, look_m: float) -> float:
     """Return the angle in rad from the heading to the start of the way; 0 when the way is very short."""
     path = plan.path_grid
     away = np.hypot(*(path - T_grid_base[:2]).T)
-    beyond = np.flatnonzero(away >= LOOK_M)
+    beyond = np.flatnonzero(away >= look_m)
     index = int(beyond[0]) if beyond.size else len(path) - 1
     if away[index] < 0.08:
         return 0.0

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lemtomap.nav.kernels import fields as kernels
-from lemtomap.nav.motion.costmap import TIGHT_COST, Costs
+from lemtomap.nav.motion.costmap import Costs
 from lemtomap.nav.types import Points
 
+USUAL_TOP = 25.0  # price of a cell that few windows go beyond: the kernel lays out buckets for it at least
 FIELD_MARGIN_M = 1.5
 """The field is also known this much cost beyond the robot, for trajectories that start by leading away."""
 
@@ -138,4 +139,4 @@ def _border(near: Costs, far: MetricPlan) -> tuple[NDArray[np.int64], NDArray[np
 def top_cost(costs: Costs) -> float:
     """Return the largest finite price of a cell."""
     finite = costs.cost[np.isfinite(costs.cost)]
-    return float(max(TIGHT_COST, finite.max() if finite.size else 1.0))
+    return float(max(USUAL_TOP, finite.max() if finite.size else 1.0))

@@ -15,7 +15,7 @@ from lemtomap.nav.route.sliding import BORDER_M, SNAP_M
 from lemtomap.nav.types import Goal
 from lemtomap.se2 import Pose
 
-DETOUR_SHARE = 1.3
+DETOUR_SHARE = 1.3  # ... and
 DETOUR_M = 1.5
 """A way this much longer than the edges it follows leads round something."""
 BESIDE_M = 0.75

@@ -9,6 +9,7 @@ from lemtomap.errors import NoRoute
 from lemtomap.nav.config import NavConfig
 from lemtomap.nav.motion.metric import MetricPlan, Reach
 from lemtomap.nav.route.barriers import find_barrier, find_detour
+from lemtomap.nav.route.blocked import BlockedEdges
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.planning import RoutePlanner
 from lemtomap.nav.route.sliding import BORDER_M, SNAP_M, Target
@@ -20,11 +21,10 @@ from lemtomap.nav.route.watching import (
 )
 from lemtomap.nav.types import Goal
 from lemtomap.se2 import Pose
-from lemtomap.topo.events import EdgeBlocked, EdgeTraversed, NavEvent
+from lemtomap.topo.events import EdgeTraversed, NavEvent
 from lemtomap.types import MapView, RouteGraph, Twist
 
-NEAR_BARRIER_M = 1.0
-SEEN_FREE_TIMES = 2
+NEAR_BARRIER_M = 1.0  # the robot stands before what closes its edge
 STARTS_TRIED = 12
 BESIDE_M = 8.0
 """Nodes this near may stand in for the associated one."""
@@ -45,15 +45,6 @@ class CycleInput:
     events: list[NavEvent] = field(default_factory=list)
 
 
-@dataclass(frozen=True, slots=True)
-class Closing:
-    """How often an edge was closed of late, and when last."""
-
-    count: int
-    stamp_s: float
-    link: Link
-
-
 class RouteKeeper:
     """Holds the route to one goal and which edges are closed; closed edges outlive the goal."""
 
@@ -61,8 +52,7 @@ class RouteKeeper:
         self._config = config
         self._planner = RoutePlanner(config.route)
         self._version: int | None = None
-        self._closed_s: dict[int, float] = {}
-        self._closings: dict[int, Closing] = {}
+        self.blocked = BlockedEdges(config.recovery)
         self.route: Route | None = None
         """None: to be planned anew."""
         self.barred_s: float | None = None
@@ -89,7 +79,6 @@ class RouteKeeper:
         if self.route is not None and self._version == moment.graph.version and here in self.route.nodes:
             self.route = self.route.since(here)
             return self.route
-        self._closed_s = {edge: until for edge, until in self._closed_s.items() if until > moment.now_s}
         self.route = self._plan_from(here, goal, moment)
         return self.route
 
@@ -115,7 +104,8 @@ class RouteKeeper:
     def _plan_from(self, node_id: int, goal: Goal, moment: CycleInput) -> Route:
         view = replace(moment.map_view, associated_id=node_id)
         self._version = moment.graph.version
-        return self._planner.plan(moment.graph, view, goal.node_id, moment.now_s, self._closed_s)
+        closed_until_s = self.blocked.closed_until_s(moment.now_s)
+        return self._planner.plan(moment.graph, view, goal.node_id, moment.now_s, closed_until_s)
 
     def check(
         self, goal: Goal, target: Target | None, plan: MetricPlan | None, reach: Reach, moment: CycleInput
@@ -140,94 +130,59 @@ class RouteKeeper:
         away_m = float(np.hypot(*(np.array(barrier.p_near_grid) - moment.T_grid_base[:2])))
         near = away_m < NEAR_BARRIER_M or target is None
         if not route.edges[barrier.index].proven and not self.barriers.moving(barrier):
-            self._rule_out(route, barrier.index, moment)
+            moment.events.append(self.blocked.rule_out(_link(route, barrier.index), moment.now_s))
+            self._plan_anew()
             return None
         if not self.barriers.closed(barrier, moment.now_s, near=near):
             return None
-        on_route = (barrier.edge_id, route.nodes[barrier.index], route.nodes[barrier.index + 1])
-        self._close([on_route, *links_cut(moment.map_view, reach, barrier, BORDER_M)], moment)
+        self._close(
+            [_link(route, barrier.index), *links_cut(moment.map_view, reach, barrier, BORDER_M)], moment
+        )
         return barrier.p_middle_grid
 
     def reopen(self, reach: Reach, moment: CycleInput) -> bool:
-        """Open closed edges that are seen to be free; tell whether there were any.
-
-        One that proved closed again and again, though it had been seen free, waits for its time.
-        """
-        often = {e for e, closing in self._closings.items() if closing.count > SEEN_FREE_TIMES}
-        links = links_open_again(self._closed_s.keys() - often, moment.map_view, reach)
+        """Open closed edges that are seen to be free; return True if there were any."""
+        links = links_open_again(self.blocked.may_be_seen_free(), moment.map_view, reach)
         self._open(links, moment)
         return bool(links)
 
     def retry(self, moment: CycleInput) -> bool:
-        """Open, once for a goal, what was closed a while ago: a second look is better than to refuse.
-
-        False when there is nothing of the kind.
-        """
-        before_s = moment.now_s - self._config.recovery.block_s
-        old = [
-            closing.link
-            for e, closing in self._closings.items()
-            if e in self._closed_s and closing.stamp_s < before_s
-        ]
-        if self._retried or not old:
-            return False
-        self._retried = True
+        """Open, once for a goal, what was closed a while ago; return False when there is nothing."""
+        old = [] if self._retried else self.blocked.worth_a_retry(moment.now_s)
+        self._retried = self._retried or bool(old)
         self._open(old, moment)
-        return True
-
-    def _open(self, links: Sequence[Link], moment: CycleInput) -> None:
-        """Plan over these edges again, and tell the map."""
-        for edge_id, a, b in links:
-            del self._closed_s[edge_id]
-            moment.events.append(EdgeBlocked(a, b, 0.0))
-            self.barred_s = moment.now_s  # the map will hear of it in a moment
+        return bool(old)
 
     def close_next(self, moment: CycleInput) -> bool:
-        """Close the first edge of the route; False when there is none."""
-        route = self.route
-        if route is None or not route.edges:
+        """Close the first edge of the route; return False when there is none."""
+        if self.route is None or not self.route.edges:
             return False
-        self._close([(route.edges[0].edge_id, route.nodes[0], route.nodes[1])], moment)
+        self._close([_link(self.route, 0)], moment)
         return True
 
     def passed(self, driven: EdgeTraversed, graph: RouteGraph) -> None:
-        """Forget how often an edge was closed: it was open all along its length since."""
-        for edge in graph.edges_of(driven.from_id) if self._closings else ():
+        """Take note of an edge driven from end to end."""
+        for edge in graph.edges_of(driven.from_id):
             if edge.other_id == driven.to_id:
-                self._closings.pop(edge.edge_id, None)
+                self.blocked.driven(edge.edge_id)
 
-    def _rule_out(self, route: Route, index: int, moment: CycleInput) -> None:
-        """Close a closure that the window shows to lead through something: it never was a way."""
-        edge_id, until_s = route.edges[index].edge_id, moment.now_s + self._config.recovery.block_longest_s
-        self._closed_s[edge_id] = until_s
-        moment.events.append(EdgeBlocked(route.nodes[index], route.nodes[index + 1], until_s))
-        self.route = None
-        self.barriers.reset()
+    def _open(self, links: Sequence[Link], moment: CycleInput) -> None:
+        moment.events.extend(self.blocked.open(links))
+        if links:
+            self.barred_s = moment.now_s  # the map will hear of it in a moment
 
     def _close(self, links: Sequence[Link], moment: CycleInput) -> None:
-        """Plan around these edges from now on, and tell the map."""
-        longest_s = self._config.recovery.block_longest_s
-        self._closings = {e: c for e, c in self._closings.items() if moment.now_s - c.stamp_s < longest_s}
-        for link in {link[0]: link for link in links}.values():
-            edge_id, a, b = link
-            until_s = self._closed_s[edge_id] = moment.now_s + self._block_s(link, moment.now_s)
-            moment.events.append(EdgeBlocked(a, b, until_s))
+        moment.events.extend(self.blocked.close(links, moment.now_s))
         self.barred_s = moment.now_s
+        self._plan_anew()
+
+    def _plan_anew(self) -> None:
         self.route = None
         self.barriers.reset()
 
-    def _block_s(self, link: Link, now_s: float) -> float:
-        """Return how long an edge is to be closed: each time longer, else two closed ways that open again
-        while the robot is at the other one send it to and fro for ever.
 
-        Found cut while it is closed, it was not closed again: one barrier is met from several edges.
-        """
-        recovery, edge_id = self._config.recovery, link[0]
-        before = self._closings[edge_id].count if edge_id in self._closings else 0
-        if before and self._closed_s.get(edge_id, 0.0) > now_s:
-            before -= 1
-        self._closings[edge_id] = Closing(before + 1, now_s, link)
-        return min(recovery.block_s * recovery.block_growth**before, recovery.block_longest_s)
+def _link(route: Route, index: int) -> Link:
+    return route.edges[index].edge_id, route.nodes[index], route.nodes[index + 1]
 
 
 def _in_reach(map_view: MapView, reach: Reach, T_grid_base: Pose) -> list[int]:

@@ -28,7 +28,7 @@ from lemtomap.topo.naming import shown
 
 MOST_ID = 1 << 48
 MOST_LEVEL = 999
-MOST_LENGTH_M = 1e6
+MOST_LENGTH_M = 1e6  # no edge is a thousand kilometres long
 MOST_YAW_RAD = 2.0 * np.pi
 MOST_BLOB_BYTES = 1 << 16  # of a place or a picture of ground, which take some hundred
 MOST_TEXT = 1 << 20  # characters; the journal's largest are a tenth of it

@@ -158,6 +158,11 @@ class TopoReader:
             row = self._db.execute("SELECT node FROM name WHERE name = ?", (name,)).fetchone()
         return None if row is None else int(row[0])
 
+    def names(self) -> dict[str, int]:
+        """Return every name, and the node that bears it."""
+        with schema.guarded(self.path):
+            return dict(self._db.execute("SELECT name, node FROM name"))
+
     def close(self) -> None:
         """Close the connection; the file is untouched."""
         self._db.close()

@@ -12,7 +12,7 @@ Ranges = NDArray[np.uint8]
 Values = NDArray[np.float64]
 
 BEARINGS = 72
-RANGE_M = 0.02
+RANGE_M = 0.02  # of one step: a byte reaches five metres
 OPEN = 250  # five metres: localisation data reach as far
 UNSEEN = 255
 MOST_UNLIKE = 50  # one metre: a chair moved, or a door shut, counts no more than that

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from lemtomap.errors import BadSetting
-from lemtomap.settings import within
+from lemtomap.settings import check_order, refuse, within
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +32,10 @@ class SearchConfig:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.least_score < 1.0:
-            raise BadSetting(f"least_score must lie between 0 and 1, is {self.least_score}")
+            refuse("must lie between 0 and 1", least_score=self.least_score)
         if not 2 <= self.levels <= 8:
-            raise BadSetting(f"levels must lie between 2 and 8, is {self.levels}")
+            refuse("must lie between 2 and 8", levels=self.levels)
+        check_order(self, "free_below", "occupied_from")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +45,8 @@ class GateConfig:
     outlook_nodes: int = 20_000  # nodes kept in view around the robot, 4 MB; further ones by look-up only
     outlook_per_update: int = 40  # nodes reached in one update: 0.3 ms
     renew_after: int = 16  # new nodes before the outlook starts afresh from where the robot is
-    shift_var_per_m: float = 0.02**2  # m^2 per m, on top of the edges' own: what a window's map is bent by
-    turn_var_per_m: float = 0.004**2  # rad^2 per m, likewise
+    shift_var_m2_per_m: float = 0.02**2  # m^2 per m, on top of the edges' own: what a window's map is bent by
+    turn_var_rad2_per_m: float = 0.004**2  # rad^2 per m, likewise
     arm_m: float = 10.0  # weighs heading against shift when ways are compared: half a window
     gate_sigmas: float = 3.0  # 99.7 % of what the graph itself thinks possible
     least_box_m: float = 1.0  # a search is never narrower than this

@@ -123,7 +123,7 @@ class GraphUncertainty:
 
     def _variances(self, leg: DirectedEdge) -> tuple[float, float]:
         config, (_, _, _, _, _, length, shift_var, turn_var) = self._config, leg
-        return shift_var + config.shift_var_per_m * length, turn_var + config.turn_var_per_m * length
+        return shift_var + config.shift_var_m2_per_m * length, turn_var + config.turn_var_rad2_per_m * length
 
     def _after(self, known: _Known, leg: DirectedEdge, node_id: int) -> _Known:
         """Return where an edge from a node reached leads."""

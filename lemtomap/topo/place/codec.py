@@ -16,8 +16,8 @@ from lemtomap.errors import BadMap
 from lemtomap.topo.file.rows import MOST_PLACE_CELLS, PLACE_FORMAT
 from lemtomap.topo.kernels import boundary as kernels
 
-CELL_M = 0.1
-OFFSET_STEP_M = 0.025
+CELL_M = 0.1  # the file's
+OFFSET_STEP_M = 0.025  # the file's: a quarter of a cell
 NORMAL_REACH_CELLS = 2
 SURE_SIDE = 0.2  # cosine of the mean look at a cell: glancing or from both sides, its front is not known
 HEADER_BYTES = 2

@@ -13,7 +13,7 @@ from lemtomap.se2 import Pose
 from lemtomap.topo.kernels import gathering
 from lemtomap.types import GridView
 
-CELL_M = 0.05
+CELL_M = 0.05  # half a cell of the coded place
 LEAST_HITS = 2.0  # one hit alone may be a mixed pixel at an edge
 EVERY_M = 0.1  # a scan taken from nearly the same place tells nothing new
 EVERY_RAD = 0.1

@@ -11,7 +11,7 @@ from lemtomap.topo.loops.config import GateConfig
 from lemtomap.topo.loops.outlook import GraphUncertainty
 from lemtomap.types import EdgeType
 
-EXACT = GateConfig(shift_var_per_m=0.0, turn_var_per_m=0.0)
+EXACT = GateConfig(shift_var_m2_per_m=0.0, turn_var_rad2_per_m=0.0)
 STEP = np.array([1.0, 0.0, np.deg2rad(12.0)])
 SIGMA = np.array([0.02, 0.02, 0.01])
 
@@ -72,7 +72,7 @@ def test_only_nodes_that_may_be_here_are_near():
     graph = Graph()
     for k in range(60):
         graph.join(k, k + 1, np.array([1.0, 0.0, 0.0 if k != 30 else np.pi]))
-    outlook = GraphUncertainty(graph, 60, GateConfig(shift_var_per_m=1e-4, turn_var_per_m=1e-6))
+    outlook = GraphUncertainty(graph, 60, GateConfig(shift_var_m2_per_m=1e-4, turn_var_rad2_per_m=1e-6))
     outlook.advance(100)
     x, y, _ = outlook.pose(60)
     near, _, _ = outlook.near(60, x, y, 3.0, 12.0)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lemtomap import se2
-from lemtomap.nav.config import BodyLimits, CostmapConfig
+from lemtomap.nav.config import BodyLimits, CollisionConfig, CostmapConfig
 from lemtomap.nav.kernels import fields as kernels
 from lemtomap.nav.motion.collision import limit_twist
 from lemtomap.nav.motion.costmap import Costmap
@@ -149,10 +149,10 @@ def test_field_agrees_with_straight_distance_in_the_open():
 
 def test_raw_points_slow_the_robot_down_and_stop_it():
     fast = Twist(0.5, 0.0)
-    assert limit_twist(fast, np.array([[1.5, 0.0]]), BODY) == fast
-    near = limit_twist(fast, np.array([[0.40, 0.05]]), BODY)
+    assert limit_twist(fast, np.array([[1.5, 0.0]]), BODY, CollisionConfig()) == fast
+    near = limit_twist(fast, np.array([[0.40, 0.05]]), BODY, CollisionConfig())
     assert 0.0 < near.v_mps < 0.45
-    assert limit_twist(fast, np.array([[0.215, 0.0]]), BODY).v_mps == 0.0
-    assert limit_twist(fast, np.array([[-0.3, 0.0], [0.1, 0.25]]), BODY) == fast
+    assert limit_twist(fast, np.array([[0.215, 0.0]]), BODY, CollisionConfig()).v_mps == 0.0
+    assert limit_twist(fast, np.array([[-0.3, 0.0], [0.1, 0.25]]), BODY, CollisionConfig()) == fast
     turning = Twist(0.0, 1.0)
-    assert limit_twist(turning, np.array([[0.19, 0.0]]), BODY) == turning
+    assert limit_twist(turning, np.array([[0.19, 0.0]]), BODY, CollisionConfig()) == turning

@@ -133,7 +133,7 @@ def test_a_way_closed_again_and_again_is_looked_at_once_more_before_a_new_goal_i
     for _ in range(3):
         assert run(world, navigator, 9, 90.0)[-1].state == NavState.FAILED
         world.now_s += 1.1 * RecoveryConfig().block_s * RecoveryConfig().block_growth
-    closed_until_s = max(world.now_s, *navigator._way._closed_s.values())
+    closed_until_s = max(world.now_s, *navigator._way.blocked.closed_until_s(world.now_s).values())
     world.box(6.55, 2.0, 7.45, 2.15, value=False)
     assert closed_until_s > world.now_s + 100.0, "else nothing is shown"
     assert run(world, navigator, 9, 90.0)[-1].state == NavState.ARRIVED

@@ -77,7 +77,7 @@ def test_a_missing_log_is_named(refused, tmp_path):
     ("options", "reason"),
     [
         (["--window", "8", "--max-range", "5.6"], "twice"),
-        (["--max-range", "0"], "max range"),
+        (["--max-range", "0"], "--max-range: slam.max_range_m: 0.0 must lie"),
         (["--window", "-3"], "window"),
         (["--particles", "0"], "particles"),
         (["--particles", "many"], "particles"),

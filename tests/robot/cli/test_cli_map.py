@@ -117,7 +117,7 @@ def test_summary_map_and_picture_agree(out):
     assert told["nodes"] == nodes
     assert nodes >= 4
     assert told["map_bytes"] == (out / "map.lemto").stat().st_size
-    assert (told["seed"], told["config"]["slam"], told["config"]["particles"]) == (3, "window", 1)
+    assert (told["seed"], told["slam"], told["config"]["slam"]["particles"]) == (3, "window", 1)
     needed = {
         "updates",
         "cpu_s",
@@ -147,7 +147,7 @@ def test_particles_map_it_too(log, tmp_path, options, slam):
     out = tmp_path / slam
     assert main(["map", str(log), "--out", str(out), *options]) == 0
     assert len((out / "trajectory.tum").read_text().splitlines()) == SCANS
-    assert json.loads((out / "summary.json").read_text())["config"]["slam"] == slam
+    assert json.loads((out / "summary.json").read_text())["slam"] == slam
 
 
 def test_a_single_hypothesis_with_particles_is_refused(log, tmp_path, capsys):

@@ -11,14 +11,15 @@ from lemtomap.drivers.hokuyo.events import LaserScan
 from lemtomap.drivers.kobuki.events import KobukiSample
 from lemtomap.errors import BadLog, BadSetting
 from lemtomap.robot.build import build_core
-from lemtomap.robot.config import RobotConfig
+from lemtomap.robot.cli.main import main
+from lemtomap.robot.config import LaserConfig, RobotConfig
 from lemtomap.robot.devices.mapped_scan import MappedScan, from_values, to_values
 from lemtomap.robot.devices.recorded import Gap, Recording
 from lemtomap.robot.devices.recording import HOKUYO, KOBUKI, Recorder
 from lemtomap.robot.devices.replay import replay_events, replay_map
 from lemtomap.robot.devices.wire import RecordedHokuyoSession, RecordedKobukiSession, Wire
 from lemtomap.robot.output.progress import Bar
-from lemtomap.robot.runs.replayed import replay_run, settings_for
+from lemtomap.robot.runs.replayed import Changes, replay_run, settings_for
 from lemtomap.robot.runs.simulated import SimOptions, run_sim
 from lemtomap.sim import worlds
 from lemtomap.sim.errors import Unplugged
@@ -126,7 +127,7 @@ def test_scans_that_the_mapper_left_out_are_left_out_again(run, tmp_path):
     recording = Recording.open(run)
     kept = list(recording.scans())[::2]
     recording.scans = lambda: iter(kept)
-    settings = settings_for(recording, None, None)
+    settings = settings_for(recording)
     core = build_core(settings.config, tmp_path / "map.lemto", seed=settings.seed, durable=False)
     replay_map(recording, core, as_then=True)
     mapped = [mapped.stamp_s for mapped in core.exchange.mapped_scans.drain()]
@@ -185,20 +186,57 @@ def test_the_latest_parts_alone_can_be_replayed(tmp_path):
 
 def test_other_settings_than_the_run_s_are_told(run):
     recording = Recording.open(run)
-    assert settings_for(recording, None, None).as_then
-    assert settings_for(recording, "window", 3).as_then
-    assert "other settings" in settings_for(recording, "rolling", None).why_not
-    assert "other settings" in settings_for(recording, None, 4).why_not
+    assert settings_for(recording).as_then
+    assert settings_for(recording, Changes("window", 3)).as_then
+    assert "other settings" in settings_for(recording, Changes("rolling")).why_not
+    assert "other settings" in settings_for(recording, Changes(seed=4)).why_not
     recording.about["new_map"] = False
-    assert "went on with a map" in settings_for(recording, None, None).why_not
+    assert "went on with a map" in settings_for(recording).why_not
     recording.about["config"] = {"strange": 1}
-    assert "does not tell" in settings_for(recording, None, None).why_not
+    assert "cannot be used: strange: unknown key" in settings_for(recording).why_not
+    del recording.about["config"]
+    assert "does not tell" in settings_for(recording).why_not
 
 
 def test_a_recording_is_mapped_with_the_configuration_of_its_run(run):
     recording = Recording.open(run)
     recording.about["config"]["laser"]["x_m"] = 0.15
-    assert settings_for(recording, None, None).config.laser.x_m == 0.15
+    assert settings_for(recording).config.laser.x_m == 0.15
+
+
+def test_one_setting_is_changed_over_those_of_the_run_and_a_file_replaces_them_all(run, tmp_path):
+    recording = Recording.open(run)
+    recording.about["config"]["laser"]["x_m"] = 0.15
+    changed = settings_for(recording, Changes(orders=("laser.y_m=0.05",)))
+    assert (changed.config.laser.x_m, changed.config.laser.y_m) == (0.15, 0.05)
+    assert changed.why_not == "mapped with other settings than the run's"
+    assert settings_for(recording, Changes(orders=("laser.x_m=0.15",))).as_then
+    file = tmp_path / "robot.toml"
+    file.write_text("[laser]\ny_m = 0.02\n")
+    replaced = settings_for(recording, Changes(file=file, orders=("laser.yaw_rad=1",)))
+    assert replaced.config.laser == LaserConfig(0.0, 0.02, 1.0)
+    assert (replaced.as_then, replaced.why_not) == (False, f"with the settings of {file}, not the run's own")
+
+
+def test_a_run_is_recorded_with_its_settings_and_replayed_with_them_from_the_command_line(tmp_path, capsys):
+    run, again, other = (tmp_path / name for name in ("run", "again", "other"))
+    seconds = ["--fast", "--duration", "4", "--mission", "explore", "--set", "laser.x_m=-0.05"]
+    assert main(["sim", *seconds, "--out", str(run)]) == 0
+    assert json.loads((run / "summary.json").read_text())["config"]["laser"]["x_m"] == -0.05
+    assert main(["replay", str(run), "--out", str(again)]) == 0
+    assert (again / "trajectory.tum").read_bytes() == (run / "trajectory.tum").read_bytes()
+    capsys.readouterr()
+    assert main(["replay", str(run), "--out", str(other), "--set", "laser.x_m=0.05"]) == 0
+    assert "mapped with other settings than the run's" in capsys.readouterr().out
+    assert json.loads((other / "summary.json").read_text())["config"]["laser"]["x_m"] == 0.05
+    assert (other / "trajectory.tum").read_bytes() != (run / "trajectory.tum").read_bytes()
+
+
+def test_a_bad_setting_for_a_replay_is_refused_and_leaves_nothing(run, tmp_path, capsys):
+    command = ["replay", str(run), "--out", str(tmp_path / "out"), "--set", "slam.window_m=1"]
+    assert main(command) == 2
+    assert capsys.readouterr().err.startswith("lemtomap: --set slam.window_m=1: slam.window_m: 1 must lie")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_recording_without_a_scan_is_refused_and_leaves_nothing(tmp_path):

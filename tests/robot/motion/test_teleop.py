@@ -8,10 +8,10 @@ import pytest
 
 from lemtomap.errors import BadSetting
 from lemtomap.robot.motion.teleop import (
-    HOLD_S,
     REST,
     KeyListener,
     Keys,
+    TeleopConfig,
     driven_by_hand,
 )
 from lemtomap.types import Twist
@@ -22,7 +22,7 @@ def test_a_key_drives_as_long_as_it_repeats_and_then_the_robot_stands():
     for step in range(10):
         keys.press("w", step * 0.5)
         assert keys.wish(step * 0.5 + 0.45).v_mps > 0
-    assert keys.wish(4.51 + HOLD_S) == REST
+    assert keys.wish(4.51 + keys.config.hold_s) == REST
 
 
 def test_the_last_key_wins_and_space_stops_at_once():
@@ -73,3 +73,12 @@ def test_arrows_drive_even_when_their_characters_come_at_once(monkeypatch):
             os.write(ours, b"\x1b[A")
             assert driven.wait(10.0)
     os.close(ours)
+
+
+def test_speed_and_hold_are_the_settings():
+    keys = Keys(TeleopConfig(forward_mps=0.2, backward_mps=0.05, turn_radps=0.4, hold_s=1.0))
+    for key, wish in (("w", (0.2, 0.0)), ("\x1b[B", (-0.05, 0.0)), ("a", (0.0, 0.4)), ("d", (0.0, -0.4))):
+        keys.press(key, 5.0)
+        twist = keys.wish(5.99)
+        assert (twist.v_mps, twist.w_radps) == wish
+    assert keys.wish(6.01).w_radps == 0.0

@@ -97,7 +97,7 @@ class Drive:
         away_m = float(np.hypot(*(truth.T_world_base[:2] - np.array(self.barrier[:2]))))
         if math.isnan(self.seen_s) and away_m < IN_SIGHT_M and self._in_sight(truth.T_world_base):
             self.seen_s = moment.now_s
-        closed = moment.navigator._way._closed_s  # noqa: SLF001 - measured from outside on purpose
+        closed = moment.navigator._way.blocked.closed_until_s(moment.now_s)  # noqa: SLF001 - measured from outside on purpose
         if math.isnan(self.closed_s) and closed:
             self.closed_s = moment.now_s
         if moment.output.cycle <= self._cycle or moment.output.state not in {
