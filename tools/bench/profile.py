@@ -28,13 +28,11 @@ from matplotlib.figure import Figure
 from lemtomap.errors import LemtomapError
 from lemtomap.grid import SLAMS
 from lemtomap.pipeline import Mapper
+from lemtomap.robot.build import build_slam, build_topo
 from lemtomap.robot.child import ROOT
 from lemtomap.robot.output.progress import progress_bar
-from lemtomap.robot.runs.map_log import MapLogOptions, map_log
-from lemtomap.topo.config import TopoConfig
+from lemtomap.robot.runs.map_log import MapLogOptions, chosen, map_log
 from lemtomap.topo.file.store import TopoStore
-from lemtomap.topo.loops import LoopRecogniser
-from lemtomap.topo.mapper import TopoMapper
 from tools.bench.parts.mapping_runs import table
 
 TRACED_SCANS = 3000
@@ -156,8 +154,8 @@ def _trace(options: MapLogOptions, found: Profile) -> None:
     log, kb = options.open_log(), []
     with tempfile.TemporaryDirectory() as folder:
         store = TopoStore.create(Path(folder) / "map.lemto", durable=False)
-        topo = TopoMapper(TopoConfig(), store, recogniser=LoopRecogniser())
-        mapper = Mapper(lambda: SLAMS[options.slam](options.slam_config(), 0), topo, watched=False)
+        topo = build_topo(options.slam, options.config, store)
+        mapper = Mapper(lambda: build_slam(options.slam, options.config, 0), topo, watched=False)
         scans = islice(log, TRACED_SCANS)
         for odometry, scan in islice(scans, TRACED_SCANS // 10):
             mapper.update(scan, odometry)
@@ -235,7 +233,8 @@ def main(arguments: Sequence[str] | None = None, say: Callable[[str], None] = pr
     parser.add_argument("--out", type=Path, default=Path("runs/profile"))
     args = parser.parse_args(arguments)
     try:
-        found = profiled(MapLogOptions(args.log, args.out / "map", args.slam))
+        config = chosen(args.slam, None, [])
+        found = profiled(MapLogOptions(args.log, args.out / "map", args.slam, config))
     except LemtomapError as error:
         print(f"lemtomap bench profile: {error}", file=sys.stderr)
         return 2
