@@ -22,6 +22,8 @@ KEYS = {
     "edge": "id",
     "name": "name",
     "area": "id",
+    "door": "id",
+    "door_edge": "edge",
     "placeholder": "id",
     "ground": "node",
     "mark": "id",
