@@ -3,6 +3,7 @@
 from functools import partial
 from pathlib import Path
 
+from lemtomap.areas.segmentation import AreaSegmenter
 from lemtomap.errors import BadSetting
 from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam
 from lemtomap.nav.navigator import Navigator
@@ -42,7 +43,8 @@ def build_core(
     recogniser = (
         None if slam == "gmapping" else LoopRecogniser(config.loops)
     )  # a growing grid is too large to search
-    topo = TopoMapper(config.topo, store, recogniser=recogniser)
+    areas = None if slam == "gmapping" else AreaSegmenter(config.areas)
+    topo = TopoMapper(config.topo, store, recogniser=recogniser, areas=areas)
     mapping = MappingStep(Mapper(lambda: build_slam(slam, config, seed), topo), exchange)
     reader = partial(TopoReader, map_path, is_checked=True)
     navigation = NavigationStep(Navigator(config.nav), exchange, reader)

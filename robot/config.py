@@ -20,6 +20,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Strict, ValidationError, create_model
 from pydantic_core import PydanticCustomError
 
+from lemtomap.areas.config import AreaConfig
 from lemtomap.errors import BadSetting
 from lemtomap.grid.config import SlamConfig
 from lemtomap.nav.config import ExploreConfig, NavConfig
@@ -106,6 +107,7 @@ class RobotConfig:
     smoother: SmootherConfig = field(default_factory=SmootherConfig)
     explore: ExploreConfig = field(default_factory=ExploreConfig)
     loops: LoopConfig = field(default_factory=LoopConfig)
+    areas: AreaConfig = field(default_factory=AreaConfig)
     docking: DockingConfig = field(default_factory=DockingConfig)
     retreat: ReflexConfig = field(default_factory=ReflexConfig)
 

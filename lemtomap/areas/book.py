@@ -65,10 +65,17 @@ class AreaBook:
             door.passed, int(door.is_door),
         )  # fmt: skip
         self._store.write(f"REPLACE INTO door({_DOOR}) VALUES({', '.join('?' * len(values))})", values)
-        for edge_id in door.edges:
-            self._store.write(
-                "INSERT OR IGNORE INTO door_edge(edge, door) VALUES(?, ?)", (edge_id, door.door_id)
-            )
+        self.put_edges(door)
+
+    def put_edges(self, door: Door) -> None:
+        """Write which edges lead through a door. An edge through two stays with the one it had first."""
+        here = "SELECT edge FROM door_edge WHERE door = ?"
+        before = {edge_id for (edge_id,) in self._store.query(here, (door.door_id,))}
+        for edge_id in before - set(door.edges):
+            self._store.write("DELETE FROM door_edge WHERE edge = ?", (edge_id,))
+        for edge_id in set(door.edges) - before:
+            how = "INSERT OR IGNORE INTO door_edge(edge, door) VALUES(?, ?)"
+            self._store.write(how, (edge_id, door.door_id))
 
     def delete_door(self, door_id: int) -> None:
         """Remove what proved to be no door. Its ID stays used for ever."""
@@ -86,6 +93,16 @@ class AreaBook:
         """Return all areas by ID. Empty for a map in which none were looked for yet. Raises BadMap."""
         rows = self._store.query("SELECT id, name, kind, tags FROM area ORDER BY id")
         return [self._area(row) for row in rows]
+
+    def some(self, area_ids: Iterable[int]) -> dict[int, Area]:
+        """Return those of some areas that have a row, by ID."""
+        sql = "SELECT id, name, kind, tags FROM area WHERE id IN (SELECT value FROM json_each(?))"
+        rows = list(self._store.query(sql, (json.dumps(list(area_ids)),)))
+        return {row[0]: self._area(row) for row in rows}
+
+    def is_used(self, area_id: int) -> bool:
+        """Return True if some node bears this area's ID."""
+        return any(True for _ in self._store.query("SELECT 1 FROM node WHERE area = ? LIMIT 1", (area_id,)))
 
     def area(self, area_id: int) -> Area | None:
         """Return the area with this ID, or the one that took it in; None when there is neither."""

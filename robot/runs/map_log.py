@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.areas.segmentation import AreaSegmenter
 from lemtomap.errors import BadSetting
 from lemtomap.grid import (
     DEFAULT_SLAM,
@@ -123,8 +124,10 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
         slam = _Timed(grid)
         store = TopoStore.create(stage / "map.lemto", durable=False)
         # the growing grid closes its own loops and is far too large to search
-        recogniser = None if options.slam == "gmapping" else LoopRecogniser()
-        topo = TopoMapper(TopoConfig(), store, recogniser=recogniser)
+        slam_is_grown = options.slam == "gmapping"
+        recogniser = None if slam_is_grown else LoopRecogniser()
+        areas = None if slam_is_grown else AreaSegmenter()
+        topo = TopoMapper(TopoConfig(), store, recogniser=recogniser, areas=areas)
         try:
             with first_use(bar):
                 drive = _drive(log, Mapper(lambda: slam, topo, watched=False), slam, bar)
