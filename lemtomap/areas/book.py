@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from lemtomap.areas.model import Area, Door
+from lemtomap.areas.model import Area, AreaKind, Door
 from lemtomap.errors import BadMap
 from lemtomap.topo.file.store import TopoStore
 
@@ -56,6 +56,10 @@ class AreaBook:
         self._store.set_meta("next_door", door.door_id + 1)
         self.put_door(door)
         return door
+
+    def next_door_id(self) -> int:
+        """Return the ID that the next new door gets."""
+        return self._next("door")
 
     def put_door(self, door: Door) -> None:
         """Write a changed door over the one with its ID, its edges too."""
@@ -121,9 +125,19 @@ class AreaBook:
         sql = "SELECT id FROM node WHERE area = ? ORDER BY id"
         return [node_id for (node_id,) in self._store.query(sql, (area_id,))]
 
+    def numbers(self) -> set[int]:
+        """Return the IDs by which areas may be called, also of those that merged into others."""
+        return {number for area in self.areas() for number in (area.area_id, *area.aliases)}
+
     def names(self) -> dict[str, int]:
         """Return {name: area ID} of the areas that have a name."""
-        return {area.name: area.area_id for area in self.areas() if area.name}
+        return {
+            name: area.area_id for area in self.areas() for name in (area.name, *area.other_names) if name
+        }
+
+    def next_area_id(self) -> int:
+        """Return the ID that the next new area gets."""
+        return self._next("area")
 
     def add_area(self, level: int = 0) -> Area:
         """Make an area with an ID never used before."""
@@ -137,6 +151,8 @@ class AreaBook:
         tags: dict[str, Any] = {"level": area.level}
         if area.aliases:
             tags["aliases"] = list(area.aliases)
+        if area.other_names:
+            tags["names"] = list(area.other_names)
         if area.is_held:
             tags["held"] = True
         values = (
@@ -156,11 +172,11 @@ class AreaBook:
         try:
             tags = json.loads(text) if text else {}
             aliases = tuple(int(number) for number in tags.get("aliases", ()))
-            return Area(
-                area_id, name or "", kind or "", aliases, int(tags.get("level", 0)), bool(tags.get("held"))
-            )
+            names = tuple(str(each) for each in tags.get("names", ()))
+            level, held = int(tags.get("level", 0)), bool(tags.get("held"))
+            return Area(area_id, name or "", AreaKind(kind) if kind else "", aliases, names, level, held)
         except (ValueError, TypeError, AttributeError, RecursionError):
-            raise BadMap(f"{self._store.path}: area {area_id}: its tags are not ours") from None
+            raise BadMap(f"{self._store.path}: area {area_id}: its kind or tags are not ours") from None
 
     def _next(self, table: str) -> int:
         """Return an ID of `door` or `area` that nothing ever had."""

@@ -175,11 +175,20 @@ class Labeller:
         winner, loser = self._book.area(winner_id), self._book.area(loser_id)
         if winner is None or loser is None or winner == loser:
             return
-        aliases = tuple(sorted({*winner.aliases, *loser.aliases, loser_id}))
         self._book.delete_area(loser_id)
-        self._book.put_area(
-            replace(winner, aliases=aliases, name=winner.name or loser.name, kind=winner.kind or loser.kind)
-        )
+        self._book.put_area(taken_in(winner, loser))
+
+
+def taken_in(winner: Area, loser: Area) -> Area:
+    """Return an area that has taken in another: IDs and names of both go on to mean it."""
+    names = [name for name in (winner.name, loser.name) if name]
+    return replace(
+        winner,
+        name=names[0] if names else "",
+        kind=winner.kind or loser.kind,
+        aliases=tuple(sorted({*winner.aliases, *loser.aliases, loser.area_id})),
+        other_names=tuple(sorted({*winner.other_names, *loser.other_names, *names[1:]})),
+    )
 
 
 def _is_fixed(area: Area) -> bool:

@@ -76,6 +76,8 @@ class Area:
     """What a person says it is; empty when nobody said anything."""
     aliases: tuple[int, ...] = ()
     """IDs of areas that proved to be part of this one."""
+    other_names: tuple[str, ...] = ()
+    """Names of those areas, which mean this one now."""
     level: int = 0
     is_held: bool = False
     """A person drew it: the robot adds nodes that are born in it, and changes nothing else."""

@@ -75,6 +75,7 @@ OTHER_NODE = Kind(f"{NODE.sql} AND {{0}} != source", "no other node of this map"
 METRES = _real(-MOST_LENGTH_M, MOST_LENGTH_M)
 STAMP = _real(-FOR_EVER_S, FOR_EVER_S)
 TEXT = Kind(f"typeof({{0}}) = 'text' AND length({{0}}) <= {MOST_TEXT}", f"no text of at most {MOST_TEXT}")
+JSON = Kind(f"{TEXT.sql} AND json_valid({{0}})", "no JSON text")
 BLOB = _blob(MOST_BLOB_BYTES)
 BOUNDARY = Kind(
     f"{BLOB.sql} AND substr({{0}}, 1, 1) = X'{PLACE_FORMAT:02X}' "
@@ -112,7 +113,7 @@ COLUMNS: dict[str, dict[str, Kind]] = {
     },
     "meta": {"key": TEXT, "value": META},
     "name": {"name": TEXT, "node": NODE},
-    "area": {"id": ID, "name": _or_none(TEXT), "kind": _or_none(TEXT), "tags": _or_none(TEXT)},
+    "area": {"id": ID, "name": _or_none(TEXT), "kind": _or_none(TEXT), "tags": _or_none(JSON)},
     "door": {
         "id": ID,
         "node": COUNT,  # whose node may have gone since

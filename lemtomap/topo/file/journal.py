@@ -58,6 +58,15 @@ class RowsBefore:
         for (key,) in list(self._store.query(sql, (value,))):
             self.touch(table, key)
 
+    def touch_all(self, table: str) -> None:
+        """Write down all rows of a table."""
+        for (key,) in list(self._store.query(f"SELECT {KEYS[table]} FROM {table}")):  # noqa: S608
+            self.touch(table, key)
+
+    def touch_new(self, table: str, key: float | str) -> None:
+        """Note a row that this edit itself has made, unless it was there before."""
+        self._before.setdefault((table, key), None)
+
     def text(self) -> str:
         """Return what was written down, as JSON."""
         return json.dumps([[table, key, row] for (table, key), row in self._before.items()])
