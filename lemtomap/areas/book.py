@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from lemtomap.areas.model import Area, AreaKind, Door
+from lemtomap.areas.model import Area, AreaKind, MappedDoor
 from lemtomap.errors import BadMap
 from lemtomap.topo.file.store import TopoStore
 
@@ -26,31 +26,31 @@ class AreaBook:
 
     # -- doors ----------------------------------------------------------------------------------------------
 
-    def doors(self) -> list[Door]:
+    def doors(self) -> list[MappedDoor]:
         """Return all doors by ID, without places where the floor only narrows."""
         return [door for door in self.gates() if door.is_door]
 
-    def gates(self) -> list[Door]:
+    def gates(self) -> list[MappedDoor]:
         """Return all doors and narrow places by ID."""
         return self._doors(f"SELECT {_DOOR} FROM door ORDER BY id")  # noqa: S608
 
-    def gates_at(self, node_ids: Iterable[int]) -> list[Door]:
+    def gates_at(self, node_ids: Iterable[int]) -> list[MappedDoor]:
         """Return the doors and narrow places that stand in the frames of some nodes, by ID."""
         numbers = json.dumps(list(node_ids))
         sql = f"SELECT {_DOOR} FROM door WHERE node IN (SELECT value FROM json_each(?)) ORDER BY id"  # noqa: S608
         return self._doors(sql, (numbers,))
 
-    def _doors(self, sql: str, values: Iterable[Any] = ()) -> list[Door]:
+    def _doors(self, sql: str, values: Iterable[Any] = ()) -> list[MappedDoor]:
         return [self._door(row) for row in list(self._store.query(sql, values))]
 
-    def _door(self, row: tuple[Any, ...]) -> Door:
+    def _door(self, row: tuple[Any, ...]) -> MappedDoor:
         number, node, x, y, yaw, width, opened, shut, last_open, last_shut, passed, is_door = row
         rows = self._store.query("SELECT edge FROM door_edge WHERE door = ? ORDER BY edge", (number,))
         edges = tuple(edge for (edge,) in rows)
         seen = (opened, shut, last_open, last_shut, passed, bool(is_door))
-        return Door(number, node, x, y, yaw, width, edges, *seen)
+        return MappedDoor(number, node, x, y, yaw, width, edges, *seen)
 
-    def add_door(self, door: Door) -> Door:
+    def add_door(self, door: MappedDoor) -> MappedDoor:
         """Write a new door; returns it with an ID never used before (`door.door_id` is ignored)."""
         door = replace(door, door_id=self._next("door"))
         self._store.set_meta("next_door", door.door_id + 1)
@@ -61,7 +61,7 @@ class AreaBook:
         """Return the ID that the next new door gets."""
         return self._next("door")
 
-    def put_door(self, door: Door) -> None:
+    def put_door(self, door: MappedDoor) -> None:
         """Write a changed door over the one with its ID, its edges too."""
         values = (
             door.door_id, door.node, float(door.x_m), float(door.y_m), float(door.yaw_rad),
@@ -71,7 +71,7 @@ class AreaBook:
         self._store.write(f"REPLACE INTO door({_DOOR}) VALUES({', '.join('?' * len(values))})", values)
         self.put_edges(door)
 
-    def put_edges(self, door: Door) -> None:
+    def put_edges(self, door: MappedDoor) -> None:
         """Write which edges lead through a door. An edge through two stays with the one it had first."""
         here = "SELECT edge FROM door_edge WHERE door = ?"
         before = {edge_id for (edge_id,) in self._store.query(here, (door.door_id,))}

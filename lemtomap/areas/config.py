@@ -23,8 +23,8 @@ class AreaConfig:
     """... within this way: a wall's thickness, and floor as wide again."""
     wall_least_m: float = within(0.5, 0.1, 0.65)
     """So far the wall at a gap's end can be followed; the leg of a chair cannot."""
-    narrow_most_m: float = within(3.0, 0.7, 8.0)  # width of an opening without a door that parts two areas
-    narrow_opens: float = within(1.5, 1.05, 10.0)  # ... and how much the clearance grows on both sides of it
+    narrow_most_m: float = within(3.5, 0.7, 8.0)  # width of an opening without a door that parts two areas
+    narrow_opens: float = within(1.3, 1.05, 10.0)  # ... and how much the clearance grows on both sides of it
     same_door_m: float = within(0.5, 0.1, 2.0)  # between two sightings of one door
     evidence_seen: float = within(0.85, 0.01, 5.0)
     """Log-odds of a door, for each look at it; ..."""

@@ -19,7 +19,7 @@ SHARED_END_M = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
+class WallGap:
     """Free floor between two obstacles, wider on both sides."""
 
     ends_grid: NDArray[np.float64]
@@ -39,12 +39,16 @@ class Gap:
         return np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1), math.remainder(yaw_rad, 2.0 * math.pi)])
 
     def is_door(self, config: AreaConfig) -> bool:
-        """Return True if its width is a door's and both ends are walls."""
-        fits = config.door_least_m <= self.width_m <= config.door_most_m
-        return fits and self.wall_m >= config.wall_least_m
+        """Return True if its width is a door's."""
+        return config.door_least_m <= self.width_m <= config.door_most_m
+
+    def parts(self, config: AreaConfig) -> bool:
+        """Return True if it parts two areas: its ends are walls, and what is no door opens the more."""
+        is_walled = self.wall_m >= config.wall_least_m
+        return is_walled and (self.is_door(config) or self.opens >= config.narrow_opens)
 
 
-def gaps_around(grid: GridView, T_grid_base: Pose, occupied_from: int, config: AreaConfig) -> list[Gap]:
+def gaps_around(grid: GridView, T_grid_base: Pose, occupied_from: int, config: AreaConfig) -> list[WallGap]:
     """Return the doors and narrow places around the robot, narrowest first."""
     rows, cols = grid.occupancy.shape
     step, (left, low) = grid.resolution_m, grid.origin_m
@@ -69,20 +73,19 @@ def gaps_around(grid: GridView, T_grid_base: Pose, occupied_from: int, config: A
     )
     corner = np.array([left + (first_col + 0.5) * step, low + (first_row + 0.5) * step])
     gaps = [_gap(row, corner, step) for row in found[:count]]
-    kept: list[Gap] = []
+    kept: list[WallGap] = []
     for gap in sorted(gaps, key=lambda gap: gap.width_m):
-        is_narrow = gap.opens >= config.narrow_opens
-        if (gap.is_door(config) or is_narrow) and not any(_is_askew(gap, other) for other in kept):
+        if gap.parts(config) and not any(_is_askew(gap, other) for other in kept):
             kept.append(gap)
     return kept
 
 
-def _gap(row: NDArray[np.float64], corner: NDArray[np.float64], step: float) -> Gap:
+def _gap(row: NDArray[np.float64], corner: NDArray[np.float64], step: float) -> WallGap:
     ends = corner + step * row[:4].reshape(2, 2)[:, ::-1]
-    return Gap(ends, float(row[4] * step), float(min(row[5], row[6])), float(min(row[7], row[8]) * step))
+    return WallGap(ends, float(row[4] * step), float(min(row[5], row[6])), float(min(row[7], row[8]) * step))
 
 
-def _is_askew(gap: Gap, other: Gap) -> bool:
+def _is_askew(gap: WallGap, other: WallGap) -> bool:
     apart = np.linalg.norm(gap.ends_grid[:, None] - other.ends_grid[None], axis=2)
     turn = abs(math.remainder(gap.T_grid_gap[2] - other.T_grid_gap[2], math.pi))
     return bool(apart.min() < SHARED_END_M) and SKEWED_RAD[0] < turn < SKEWED_RAD[1]

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.areas.config import AreaConfig
-from lemtomap.areas.gaps import Gap
-from lemtomap.areas.model import Door
+from lemtomap.areas.gaps import WallGap
+from lemtomap.areas.model import MappedDoor
 from lemtomap.se2 import Pose, between, compose, transform
 from lemtomap.topo.kernels.sight import line_is_clear
 from lemtomap.topo.segmentation import Neighbourhood
@@ -22,7 +22,7 @@ MOST_SIGMA_M = 0.35  # a node known worse than this in the window says nothing a
 class Gate:
     """A door or narrow place, from its first sighting on. Written to the map once the evidence suffices."""
 
-    door: Door
+    door: MappedDoor
     """`door_id` is 0 until it is written."""
     log_odds: float = 0.0
     weight: float = 0.0
@@ -65,7 +65,7 @@ def is_same(gate: Gate, T_grid_gap: Pose, config: AreaConfig) -> bool:
     return abs(math.remainder(gate.T_grid_gate[2] - T_grid_gap[2], math.pi)) < math.pi / 4
 
 
-def see(gate: Gate, gap: Gap, around: Neighbourhood, config: AreaConfig) -> None:
+def see(gate: Gate, gap: WallGap, around: Neighbourhood, config: AreaConfig) -> None:
     """Take one look at a gate: it is there, and open."""
     T_grid_gap = gap.T_grid_gap
     gate.log_odds = min(config.evidence_most, gate.log_odds + config.evidence_seen)

@@ -19,7 +19,7 @@ class AreaKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Door:
+class MappedDoor:
     """A gap between wall ends, 0.6 to 1.6 m wide, that parts two areas. Its ID is never used again."""
 
     door_id: int

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from lemtomap.areas.book import AreaBook
-from lemtomap.areas.model import Door
+from lemtomap.areas.model import MappedDoor
 from lemtomap.areas.topology import AreaSummary, areas_in, kind_of
 from lemtomap.se2 import Pose
 from lemtomap.topo.file.store import TopoStore
@@ -44,7 +44,7 @@ def _area(each: AreaSummary, at: dict[int, Pose]) -> str:
     return "; ".join(told + ([f"was also {', '.join(also)}"] if also else []))
 
 
-def _door(door: Door, areas: list[AreaSummary]) -> str:
+def _door(door: MappedDoor, areas: list[AreaSummary]) -> str:
     beside = [each.area.area_id for each in areas if door.door_id in each.doors]
     state = "shut when last seen" if door.is_shut else "open"
     told = f"door {door.door_id:<5} {door.width_m:.2f} m wide, at node {door.node}; between {_some(beside)}"

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from lemtomap.areas import gates
 from lemtomap.areas.book import AreaBook
 from lemtomap.areas.config import AreaConfig
-from lemtomap.areas.gaps import Gap, gaps_around
+from lemtomap.areas.gaps import WallGap, gaps_around
 from lemtomap.areas.gates import Gate
 from lemtomap.areas.labels import Labeller
-from lemtomap.areas.model import Door
+from lemtomap.areas.model import MappedDoor
 from lemtomap.se2 import Pose, between
 from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.graph import FOR_EVER_S, Edge
@@ -117,7 +117,7 @@ class AreaSegmenter:
         same = [gate for gate in self._near if gates.is_same(gate, T_grid_gap, self.config)]
         return min(same, key=lambda gate: gates.distance_m(gate, T_grid_gap), default=None)
 
-    def _new_gate(self, gap: Gap, around: Neighbourhood) -> Gate | None:
+    def _new_gate(self, gap: WallGap, around: Neighbourhood) -> Gate | None:
         """Begin to gather evidence for a gap seen for the first time, at the nearest node of this window."""
         T_grid_gap = gap.T_grid_gap
         anchored = [node_id for node_id, standing in around.standings.items() if standing.anchored]
@@ -128,7 +128,7 @@ class AreaSegmenter:
             key=lambda k: math.dist(around.standings[k].T_grid_node[:2], T_grid_gap[:2]),
         )
         x, y, yaw = between(around.standings[node_id].T_grid_node, T_grid_gap).tolist()
-        gate = Gate(Door(0, node_id, x, y, yaw, gap.width_m))
+        gate = Gate(MappedDoor(0, node_id, x, y, yaw, gap.width_m))
         gates.place(gate, around)
         self._gates.append(gate)
         self._near.append(gate)

@@ -35,7 +35,7 @@ def find_gaps(
     """Write the gaps into float64 (N, FIELDS), narrowest first among neighbours; returns how many.
 
     A gap has two obstacle cells as ends, known free floor between them, and floor on both sides where the
-    clearance rises, within `depth_m` along its axis, to `opens` times that in its middle.
+    clearance rises, within `depth_m` (or its own width) along its axis, to `opens` times that in its middle.
     """
     rows, cols = occupancy.shape
     count = 0
@@ -61,12 +61,9 @@ def find_gaps(
             if not _is_free(occupancy, p_row, p_col, q_row, q_col):
                 continue
             half = 0.5 * wide + 0.5
-            before = _opening(
-                occupancy, clearance, mid_row, mid_col, -along_col, along_row, resolution, depth_m
-            )
-            behind = _opening(
-                occupancy, clearance, mid_row, mid_col, along_col, -along_row, resolution, depth_m
-            )
+            deep = max(depth_m, wide * resolution)
+            before = _opening(occupancy, clearance, mid_row, mid_col, -along_col, along_row, resolution, deep)
+            behind = _opening(occupancy, clearance, mid_row, mid_col, along_col, -along_row, resolution, deep)
             if before < opens * half or behind < opens * half:
                 continue
             count = _keep(
