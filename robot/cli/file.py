@@ -34,6 +34,7 @@ def register(app: typer.Typer) -> None:
         app,
         export,
         "lemtomap export office.lemto office.geojson        nav2 route server",
+        "lemtomap export office.lemto office.indoor.geojson areas and doors; .gml: IndoorGML",
         "lemtomap export office.lemto office.tmap2          topological_navigation",
         "lemtomap export office.lemto office.g2o            or .graphml, .png",
     )
@@ -68,7 +69,12 @@ def edit(
 
 def export(
     map_file: MapFile,
-    target: Annotated[Path, typer.Argument(metavar="FILE", help=".geojson, .tmap2, .g2o, .graphml or .png")],
+    target: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help=".geojson, .indoor.geojson, .gml, .tmap2, .g2o, .graphml or .png"
+        ),
+    ],
 ) -> None:
     """Write a map for another program; its suffix says which."""
     from lemtomap.robot.cli import map_file as files

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from lemtomap.areas import edit as areas
+from lemtomap.areas import export as area_export
 from lemtomap.areas.find import find_areas
 from lemtomap.areas.places import places
 from lemtomap.errors import BadSetting
@@ -172,10 +173,10 @@ EDITS: dict[str, tuple[tuple[str, ...], Edit]] = {
 
 def export_map(path: Path, target: Path) -> str:
     """Write the map for another program, by the target's suffix. Raises BadMap, BadSetting."""
-    writer = EXPORTS.get(target.suffix.lower())
-    if writer is None:
+    kind = next((each for each in EXPORTS if target.name.lower().endswith(each)), "")
+    if not kind:
         raise BadSetting(f"{target}: unknown kind; known are {', '.join(EXPORTS)}")
-    kind = target.suffix.lower()
+    writer = EXPORTS[kind]
     with TopoStore.view(path) as store:
         writer(store, target)
         closed, unproven = export.left_out(store)
@@ -189,13 +190,17 @@ def export_map(path: Path, target: Path) -> str:
 
 def _write_png(store: TopoStore, target: Path) -> None:
     """Draw; matplotlib is loaded only when it is needed."""
+    from lemtomap.areas.picture import Painting, paint
     from lemtomap.topo.whole.picture import write_png
 
-    write_png(store, target)
+    painting = Painting.of(store)
+    write_png(store, target, paint=lambda axes, places: paint(axes, painting, places, 16.0))
 
 
 EXPORTS: dict[str, Callable[[TopoStore, Path], None]] = {
-    ".geojson": export.write_geojson,
+    ".indoor.geojson": area_export.write_indoor,
+    ".geojson": area_export.write_route,
+    ".gml": area_export.write_indoorgml,
     ".tmap2": export.write_tmap2,
     ".g2o": export.write_g2o,
     ".graphml": export.write_graphml,
@@ -203,10 +208,15 @@ EXPORTS: dict[str, Callable[[TopoStore, Path], None]] = {
 }
 _PLACED = "its coordinates come from one full solve and are approximate"
 NOTES = {
+    ".indoor.geojson": f"areas and doors, Simple Indoor Tagging; {_PLACED}",
     ".geojson": f"nav2 route server; {_PLACED}",
+    ".gml": f"IndoorGML cells and states; {_PLACED}",
     ".tmap2": f"topological_navigation; {_PLACED}",
     ".g2o": f"pose graph, whose edges are measurements and not ways; {_PLACED}",
     ".graphml": "relative poses as the map holds them",
     ".png": f"a picture; {_PLACED}",
 }
-WITHOUT_CLOSED, WITHOUT_UNPROVEN = (".geojson", ".tmap2", ".g2o"), (".geojson", ".tmap2")
+WITHOUT_CLOSED, WITHOUT_UNPROVEN = (
+    (".indoor.geojson", ".geojson", ".gml", ".tmap2", ".g2o"),
+    (".indoor.geojson", ".geojson", ".gml", ".tmap2"),
+)

@@ -1,0 +1,100 @@
+"""Areas in colour, with ID and name, and doors, in any picture that shows nodes in one frame."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from lemtomap.areas.book import AreaBook
+from lemtomap.areas.topology import areas_in
+from lemtomap.se2 import Pose, transform
+from lemtomap.topo.file.store import TopoStore
+from lemtomap.topo.naming import shown
+
+COLOURS = (
+    "#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f", "#bcbd22",
+    "#17becf", "#393b79", "#637939", "#8c6d31", "#843c39", "#7b4173", "#3182bd", "#e6550d", "#31a354",
+    "#756bb1", "#636363",
+)  # fmt: skip
+STEP = 7  # through the colours: areas that follow one another look different
+DOOR_COLOUR, SHUT_COLOUR = "#d00000", "#14213d"
+LABEL = 30  # characters of an area's name in a picture
+NUMBERED_BELOW = 400  # nodes: with more, their numbers cannot be read
+
+
+def colour_of(area_id: int) -> str:
+    """Return the colour of an area, the same in every picture; grey for none."""
+    return COLOURS[area_id * STEP % len(COLOURS)] if area_id > 0 else "#b0b0b0"
+
+
+@dataclass(frozen=True, slots=True)
+class Painting:
+    """What a picture says of areas."""
+
+    area_of: Mapping[int, int]
+    """Area of each node."""
+    labels: Mapping[int, str]
+    """What stands at each area that has nodes: its ID, and its name if it has one."""
+    doors: Mapping[int, tuple[int, NDArray[np.float64], bool]]
+    """Of each door its node, both ends in that node's frame, float64 (2, 2), and whether it was shut."""
+
+    @classmethod
+    def of(cls, store: TopoStore) -> "Painting":
+        """Return what is to be painted of a map; nothing for one without areas."""
+        areas = areas_in(store)
+        return cls(
+            {node_id: each.area.area_id for each in areas for node_id in each.nodes},
+            {
+                each.area.area_id: shown(f"{each.area.area_id} {each.area.name}".strip(), LABEL)
+                for each in areas
+            },
+            {door.door_id: (door.node, door.ends(), door.is_shut) for door in AreaBook(store).doors()},
+        )
+
+
+def paint(axes: Axes, painting: Painting, places: Mapping[int, Pose], size: float, **how: Any) -> None:
+    """Draw areas and doors over nodes that stand at T_map_node, float64 (3,), each.
+
+    size: of a node, points squared, as scatter has it.
+    """
+    known = [node_id for node_id in painting.area_of if node_id in places]
+    if not known:
+        return
+    at = np.array([places[node_id][:2] for node_id in known])
+    colours = [colour_of(painting.area_of[node_id]) for node_id in known]
+    axes.scatter(at[:, 0], at[:, 1], s=size, c=colours, linewidths=0, zorder=7.5)
+    area_ids = np.array([painting.area_of[node_id] for node_id in known])
+    for area_id, label in painting.labels.items():
+        own = at[area_ids == area_id]
+        if len(own):
+            middle = own[np.argmin(np.hypot(*(own - own.mean(axis=0)).T))]
+            _write(axes, label, middle, area_id, **how)
+    for door_id, (node_id, ends, is_shut) in painting.doors.items():
+        if node_id in places:
+            line = transform(places[node_id], ends)
+            colour = SHUT_COLOUR if is_shut else DOOR_COLOUR
+            axes.plot(line[:, 0], line[:, 1], color=colour, linewidth=2.5, zorder=8)
+            _note(axes, f"d{door_id}", line.mean(axis=0), colour)
+    if len(known) < NUMBERED_BELOW:
+        for node_id in known:
+            _note(axes, str(node_id), places[node_id][:2], "#444444")
+
+
+def _write(axes: Axes, text: str, at: NDArray[np.float64], area_id: int, **how: Any) -> None:
+    box = {"boxstyle": "round,pad=0.2", "fc": "white", "ec": colour_of(area_id), "alpha": 0.85}
+    label = axes.annotate(
+        text, (float(at[0]), float(at[1])), xytext=(0, 7), textcoords="offset points", ha="center",
+        fontsize=8, fontweight="bold", color=colour_of(area_id), bbox=box, zorder=9, **how,
+    )  # fmt: skip
+    label.set_in_layout(False)
+
+
+def _note(axes: Axes, text: str, at: Pose, colour: str) -> None:
+    note = axes.annotate(
+        text, (float(at[0]), float(at[1])), xytext=(3, -3), textcoords="offset points", va="top",
+        fontsize=4, color=colour, zorder=8,
+    )  # fmt: skip
+    note.set_in_layout(False)
