@@ -3,6 +3,7 @@
 from functools import partial
 from pathlib import Path
 
+from lemtomap.areas.segmentation import AreaSegmenter
 from lemtomap.errors import BadSetting
 from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam
 from lemtomap.nav.navigator import Navigator
@@ -34,7 +35,8 @@ def build_topo(slam: str, config: RobotConfig, store: TopoStore) -> TopoMapper:
     The growing grid closes its own loops and is far too large to search.
     """
     recogniser = None if slam == "gmapping" else LoopRecogniser(config.loops)
-    return TopoMapper(config.topo, store, recogniser=recogniser)
+    areas = None if slam == "gmapping" else AreaSegmenter(config.areas)
+    return TopoMapper(config.topo, store, recogniser=recogniser, areas=areas)
 
 
 def build_core(

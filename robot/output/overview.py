@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap import se2
+from lemtomap.areas.painting import Painting
 from lemtomap.robot.child import python
 from lemtomap.robot.output.files import write_whole
 from lemtomap.se2 import Pose
@@ -62,6 +63,8 @@ class Overview:
     grid: GridView
     T_map_grid: Pose
     names: Mapping[int, str] = field(default_factory=dict)
+    painting: Painting | None = None
+    """Areas and doors; None: they are not known."""
     title: str = ""
     facts: Sequence[str] = ()
 
