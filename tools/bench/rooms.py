@@ -23,6 +23,7 @@ import numpy as np
 
 from lemtomap.sim import worlds
 from lemtomap.sim.errors import BadWorld
+from lemtomap.sim.world import World
 from tools.bench.parts.mapping_runs import table
 from tools.bench.rooms_parts.drive import drive
 from tools.bench.rooms_parts.judge import judge
@@ -100,7 +101,7 @@ def measure(job: Job) -> Figures:
     return figures
 
 
-def load(name: str) -> worlds.World:
+def load(name: str) -> World:
     """Return a world with rooms as truth. Raises BadWorld where that is damaged or missing."""
     world = worlds.load(name)
     if world.truth.damage:
@@ -132,10 +133,8 @@ def plans_in(folder: Path) -> list[tuple[str, str]]:
 
 def summary(kind: str, runs: list[Figures]) -> list[str]:
     """Return a line of the table: all runs of a kind of plan, spread over the seeds in brackets."""
-    found, counted, hits = (
-        np.array([getattr(run, name) for run in runs])
-        for name in ("doors_found", "doors_counted", "door_hits")
-    )
+    found, counted = sum(run.doors_found for run in runs), sum(run.doors_counted for run in runs)
+    hits = sum(run.door_hits for run in runs)
     passed, noticed = sum(run.passed for run in runs), sum(run.noticed for run in runs)
     path_m, nodes = sum(run.path_m for run in runs), sum(run.nodes for run in runs)
     second = [run for run in runs if run.second_changed is not None]

@@ -35,7 +35,7 @@ def picture(world: World, drive: Drive, verdict: Verdict, title: str, path: Path
     for node, pose in drive.T_world_node.items():
         area = drive.area_of.get(node, 0)
         axis.plot(*pose[:2], "o", ms=4, mec="#222222", mew=0.4, color=colours(area * 7 % 20))
-        axis.annotate(f"{node}:{area}", pose[:2], fontsize=4)
+        axis.annotate(f"{node}:{area}", (float(pose[0]), float(pose[1])), fontsize=4)
     matched = dict(verdict.match.pairs)
     for index, door in enumerate(world.truth.doors):
         colour = FOUND if index in matched else MISSED if verdict.counts[index] else LEFT_OUT
