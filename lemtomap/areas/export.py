@@ -24,7 +24,7 @@ from lemtomap.topo.naming import shown
 from lemtomap.topo.whole.export import APPROXIMATE, ways, write_geojson, write_whole
 from lemtomap.topo.whole.layout import lay_out
 
-CELL_M = 0.5
+CELL_M = 0.5  # of the raster from which outlines are taken
 Ring = list[list[float]]
 
 

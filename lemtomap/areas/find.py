@@ -24,7 +24,7 @@ from lemtomap.topo.place.codec import decode_place
 from lemtomap.topo.segmentation import Neighbourhood
 from lemtomap.types import GridView
 
-STEP_M = 0.05
+STEP_M = 0.05  # a cell of the window, so that the same detector fits
 CELLS = 240  # 12 m: what a node sees, and its neighbours beside it
 REACH_M = 8.0  # over edges, to neighbours whose memories are drawn, too
 MOST_UNDONE = 8000  # nodes of a map whose areas can be taken back as one edit

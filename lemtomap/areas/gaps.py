@@ -15,7 +15,7 @@ from lemtomap.types import GridView
 MOST_GAPS = 64
 SKEWED_RAD = (0.25, 1.1)
 """Two gaps with one end in common and this angle between them: the wider is the narrower one, seen askew."""
-SHARED_END_M = 0.3
+SHARED_END_M = 0.3  # the thickness of a wall, and the noise of its ends
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from lemtomap.robot.output.files import write_whole
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, GridView
 
-PAINT_LIMIT_S = 60.0
+PAINT_LIMIT_S = 60.0  # a picture takes a second or two
 
 
 class WallSketch:

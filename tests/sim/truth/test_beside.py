@@ -41,9 +41,9 @@ def test_a_label_image_tells_the_room_at_a_point_and_rooms_json_its_type(tmp_pat
 def test_a_label_image_turns_with_its_plan(tmp_path):
     yaw = 0.4
     truth = worlds.load(plan(tmp_path, two_rooms(), yaw)).truth
-    dx, dy = 3.0, 0.5
+    dx, dy = 0.5, 3.5  # outside the plan if that had not turned
     x, y = -1 + math.cos(yaw) * dx - math.sin(yaw) * dy, -2 + math.sin(yaw) * dx + math.cos(yaw) * dy
-    assert truth.room_at(x, y) == "7"
+    assert truth.room_at(x, y) == "3"
 
 
 def test_doors_tell_width_kind_and_rooms_in_both_spellings(tmp_path):
