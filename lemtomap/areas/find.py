@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.areas.book import AreaBook
-from lemtomap.areas.kernels.drawing import draw_free, draw_walls
+from lemtomap.areas.kernels.drawing import draw_free, draw_walls, draw_way
 from lemtomap.areas.segmentation import AreaSegmenter
 from lemtomap.errors import BadInput
 from lemtomap.se2 import IDENTITY, Pose, compose, transform
@@ -95,23 +95,35 @@ def _windows(graph: PagedGraph, nodes: Iterable[int]) -> Iterator[Neighbourhood]
         standings = {k: NodePoseEstimate(pose, np.eye(3) * 1e-4, anchored=True) for k, pose in places.items()}
         level = graph.node(node_id).level
         yield Neighbourhood(
-            node_id, IDENTITY, 0.0, 0.0, _drawn(graph.store, places), standings, occupied_from, level
+            node_id, IDENTITY, 0.0, 0.0, _drawn(graph, places), standings, occupied_from, level
         )
 
 
-def _drawn(store: TopoStore, places: dict[int, Pose]) -> GridView:
-    """Return a window with what some nodes remember, around the first of them."""
+def _drawn(graph: PagedGraph, places: dict[int, Pose]) -> GridView:
+    """Return a window with what some nodes remember, and the ways between them, around the first of them."""
     cells = np.full((CELLS, CELLS), -1, dtype=np.int8)
     half_m = 0.5 * CELLS * STEP_M
     walls: list[NDArray[np.float64]] = []
     for node_id, pose in places.items():
-        place = store.place(node_id)
+        place = graph.store.place(node_id)
         if place is None or math.hypot(pose[0], pose[1]) > 2.0 * half_m:
             continue
         points = (transform(pose, decode_place(place.boundary).points) + half_m) / STEP_M
         walls.append(points)
         draw_free(cells, (float(pose[0]) + half_m) / STEP_M, (float(pose[1]) + half_m) / STEP_M, points)
+    _draw_ways(cells, graph, places, half_m)
     for points in walls:
         draw_walls(cells, points)
     cells.setflags(write=False)
     return GridView(0.0, cells, STEP_M, (-half_m, -half_m))
+
+
+def _draw_ways(cells: NDArray[np.int8], graph: PagedGraph, places: dict[int, Pose], half_m: float) -> None:
+    """Draw the floor that must be free for the robot to take the ways that it knows."""
+    radius = TopoConfig().robot_radius_m / STEP_M
+    for node_id, here in places.items():
+        for edge in graph.edges_of(node_id):
+            there = places.get(edge.other(node_id))
+            if edge.source_id == node_id and there is not None and edge.is_proven:
+                x0, y0, x1, y1 = ((v + half_m) / STEP_M for v in (*here[:2].tolist(), *there[:2].tolist()))
+                draw_way(cells, x0, y0, x1, y1, radius)

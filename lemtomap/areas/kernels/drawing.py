@@ -41,6 +41,21 @@ def draw_free(cells: Cells, x: float, y: float, points: NDArray[np.float64]) -> 
 
 
 @njit(nogil=True, cache=True)
+def draw_way(cells: Cells, x0: float, y0: float, x1: float, y1: float, radius: float) -> None:
+    """Mark as free what a body of a radius sweeps on the line from one place to another; in cells."""
+    rows, cols = cells.shape
+    reach = math.ceil(radius)
+    steps = max(1, math.ceil(math.hypot(x1 - x0, y1 - y0)))
+    for k in range(steps + 1):
+        x, y = x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps
+        for row in range(math.floor(y) - reach, math.floor(y) + reach + 1):
+            for col in range(math.floor(x) - reach, math.floor(x) + reach + 1):
+                inside = 0 <= row < rows and 0 <= col < cols
+                if inside and math.hypot(row + 0.5 - y, col + 0.5 - x) <= radius:
+                    cells[row, col] = FREE
+
+
+@njit(nogil=True, cache=True)
 def draw_walls(cells: Cells, points: NDArray[np.float64]) -> None:
     """Mark boundary points, float64 (N, 2), in cells from the corner; neighbours join into a wall."""
     rows, cols = cells.shape
