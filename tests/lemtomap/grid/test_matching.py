@@ -104,3 +104,7 @@ def test_a_wall_s_own_face_is_matched_with_the_other_one_beside_it():
     assert match.T_grid_base[1:] == pytest.approx(ABOVE[1:], abs=0.005)
     assert match.diversity < 0.05
     assert match.quality > 0.9
+
+
+def test_a_scan_that_says_nothing_has_no_diversity():
+    assert matching._gate(np.zeros((3, 3)), np.zeros(3), 0.08) == 0.0

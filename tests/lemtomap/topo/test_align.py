@@ -228,3 +228,14 @@ def test_a_hit_is_believed_beside_an_occupied_cell_and_not_two_cells_off():
         assert len(gathering.collect_hits(*ring, 0.05, 0.0, 0.0, 1.0, 1.0, -1.0, *window)) == 0
         occupancy[20 + row // 2, 20 + col // 2] = 100
         assert len(gathering.collect_hits(*ring, 0.05, 0.0, 0.0, 1.0, 1.0, -1.0, *window)) == 1
+
+
+@pytest.mark.parametrize(("x_m", "y_m"), [(3.0, -2.0), (-2.5, 2.0)])
+def test_a_place_fits_as_well_wherever_in_the_window_it_lies(x_m, y_m):
+    T_grid_node = pose(x_m, y_m, 0.4)
+    hits = transform(T_grid_node, office())
+    predicted = compose(T_grid_node, (0.05, -0.05, 0.02))
+    match = match_place(at_node(office()), hits, window_of(hits), (predicted, PRIOR), AlignConfig())
+    assert match.refused == ""
+    assert match.score > 0.95
+    np.testing.assert_allclose(match.T_grid_node, T_grid_node, atol=0.02)

@@ -6,6 +6,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.file.reader import TopoReader
 from lemtomap.topo.file.store import TopoStore
+from lemtomap.topo.graph import Edge
 from lemtomap.topo.local import LocalMap, NodePoseEstimate
 from lemtomap.topo.localisation import NotStarted
 from lemtomap.topo.mapper import TopoMapper
@@ -183,3 +184,20 @@ def test_what_is_sure_in_the_window_follows_every_change_of_a_standing(tmp_path)
         assert local.sure() == {1}
         local.forget_all()
         assert local.sure() == set()
+
+
+def test_nodes_out_of_the_window_stand_where_all_edges_together_have_them(tmp_path):
+    """Two ways to the third node that differ by 0.4 m: it stands between, and not where the first one ends."""
+    with TopoStore.create(tmp_path / "map.lemto") as store:
+        nodes = [store.add_node().node_id for _ in range(3)]
+        for a, b, length_m in ((0, 1, 1.0), (1, 2, 1.0), (0, 2, 2.4)):
+            store.add_edge(
+                Edge(0, nodes[a], nodes[b], pose(length_m, 0, 0), 1e-2 * np.eye(3), EdgeType.ODOMETRY)
+            )
+        local = LocalMap(PagedGraph(store), TopoConfig())
+        local.anchor(nodes[0], pose(5.0, 1.0, 0.0), 1e-4 * np.eye(3), born=True)
+        local.settle(nodes[0])
+        x = [local.standings[node_id].T_grid_node[0] for node_id in nodes]
+        assert x[0] == 5.0
+        assert x[1] == pytest.approx(5.0 + 1.0 + 0.4 / 3, abs=0.02)
+        assert x[2] == pytest.approx(5.0 + 2.0 + 0.8 / 3, abs=0.02)
