@@ -1,24 +1,20 @@
 """Nodes of a map in the order of their way from one of them."""
 
-import heapq
 from collections.abc import Iterator
+from itertools import islice
 
-from lemtomap.types import RouteGraph
+from lemtomap.dijkstra import CheapestFirst
+from lemtomap.types import RouteEdge, RouteGraph
 
 
 def ways_from(graph: RouteGraph, start_id: int, at_most: int = 100_000) -> Iterator[tuple[float, int]]:
     """Yield (way in metres over edges, node id), nearest first, for at most so many nodes."""
-    done: set[int] = set()
-    heap = [(0.0, start_id)]
-    while heap and len(done) < at_most:
-        length_m, node_id = heapq.heappop(heap)
-        if node_id in done:
-            continue
-        done.add(node_id)
-        yield length_m, node_id
-        for edge in graph.edges_of(node_id):
-            if edge.other_id not in done:
-                heapq.heappush(heap, (length_m + edge.length_m, edge.other_id))
+
+    def steps_from(node_id: int) -> Iterator[tuple[int, float, RouteEdge]]:
+        return ((edge.other_id, edge.length_m, edge) for edge in graph.edges_of(node_id))
+
+    for found in islice(CheapestFirst(start_id, steps_from), at_most):
+        yield found.cost, found.node_id
 
 
 def farthest_node(graph: RouteGraph, start_id: int) -> int:
