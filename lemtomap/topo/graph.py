@@ -7,7 +7,7 @@ g2o and gtsam): the true relative pose is compose(T_source_target, xi), xi ~ N(0
 from dataclasses import dataclass
 from enum import StrEnum
 from math import hypot
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from lemtomap.types import EdgeType
 
 Covariance = NDArray[np.float64]
 """float64 (3, 3): m, m, rad, symmetric and positive definite."""
+
+Quantity = TypeVar("Quantity", float, NDArray[np.floating])
+"""One number, or many in an array."""
 
 USUAL_SPEED_MPS = 0.4  # expected speed on an edge nobody has driven yet; half of Kobuki's 0.7 m/s and a bit
 FOR_EVER_S = 1e18
@@ -79,7 +82,7 @@ class Edge:
         """
         if self.time_s is not None:
             return self.time_s
-        return self.length_m / USUAL_SPEED_MPS * detour(self.type)
+        return straight_s(self.length_m, detour(self.type))
 
     @property
     def is_closed(self) -> bool:
@@ -169,6 +172,14 @@ class Mark:
 def detour(kind: EdgeType) -> float:
     """Return the way to expect over the straight line on an edge that nobody has driven."""
     return UNPROVEN_DETOUR if kind is EdgeType.LOOP_CLOSING else 1.0
+
+
+def straight_s(length_m: Quantity, detour_share: Quantity | float = 1.0) -> Quantity:
+    """Return the time to expect over an edge that nobody has driven, or over many in arrays of equal length.
+
+    detour_share: the way to expect over the straight line; 1 where the line is seen to be free.
+    """
+    return length_m / USUAL_SPEED_MPS * detour_share
 
 
 def chain_covariance(first: Covariance, T_b_c: Pose, second: Covariance) -> Covariance:

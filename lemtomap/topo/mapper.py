@@ -13,11 +13,11 @@ from lemtomap.topo.events import NavEvent, NothingKnownHere
 from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import (
-    USUAL_SPEED_MPS,
     Covariance,
     Edge,
     chain_covariance,
     reversed_covariance,
+    straight_s,
 )
 from lemtomap.topo.keeper import PlaceKeeper, Taken
 from lemtomap.topo.learning import learn
@@ -355,7 +355,7 @@ class TopoMapper:
             joined = chain_covariance(source.covariance, edge.T_source_target, covariance)
             self.local.anchor(target_id, T_grid_target, joined)
             if directly_navigable(self._at.now.grid, source.T_grid_node, T_grid_target, self.config):
-                edge = replace(edge, time_s=edge.length_m / USUAL_SPEED_MPS)
+                edge = replace(edge, time_s=straight_s(edge.length_m))
         edge = self.graph.add_edge(edge)
         self.local.settle(self._at.associated_id)
         return edge

@@ -1,43 +1,34 @@
 """Nodes of a map in the order of their way from one of them."""
 
-import heapq
 from collections.abc import Iterator
 from collections.abc import Set as AbstractSet
+from itertools import islice
 
-from lemtomap.types import RouteGraph
+from lemtomap.dijkstra import CheapestFirst
+from lemtomap.types import RouteEdge, RouteGraph
+
+SHUT_S = 1e9  # a way through what is closed comes after all open ones
 
 
 def ways_from(graph: RouteGraph, start_id: int, at_most: int = 100_000) -> Iterator[tuple[float, int]]:
     """Yield (way in metres over edges, node id), nearest first, for at most so many nodes."""
-    done: set[int] = set()
-    heap = [(0.0, start_id)]
-    while heap and len(done) < at_most:
-        length_m, node_id = heapq.heappop(heap)
-        if node_id in done:
-            continue
-        done.add(node_id)
-        yield length_m, node_id
-        for edge in graph.edges_of(node_id):
-            if edge.other_id not in done:
-                heapq.heappush(heap, (length_m + edge.length_m, edge.other_id))
+
+    def steps_from(node_id: int) -> Iterator[tuple[int, float, RouteEdge]]:
+        return ((edge.other_id, edge.length_m, edge) for edge in graph.edges_of(node_id))
+
+    for found in islice(CheapestFirst(start_id, steps_from), at_most):
+        yield found.cost, found.node_id
 
 
 def nearest_of(graph: RouteGraph, start_id: int, node_ids: AbstractSet[int], now_s: float) -> int:
     """Return which of some nodes is reached soonest, over open ways if there are any."""
-    done: set[int] = set()
-    heap = [(0.0, 0.0, start_id)]
-    while heap:
-        closed, time_s, node_id = heapq.heappop(heap)
-        if node_id in node_ids:
-            return node_id
-        if node_id in done:
-            continue
-        done.add(node_id)
+
+    def steps_from(node_id: int) -> Iterator[tuple[int, float, RouteEdge]]:
         for edge in graph.edges_of(node_id):
-            if edge.other_id not in done:
-                barred = float(edge.blocked_until_s > now_s)  # a way through what is closed comes last
-                heapq.heappush(heap, (closed + barred, time_s + edge.time_s, edge.other_id))
-    return min(node_ids)
+            yield edge.other_id, edge.time_s + (SHUT_S if edge.blocked_until_s > now_s else 0.0), edge
+
+    found = (settled.node_id for settled in CheapestFirst(start_id, steps_from))
+    return next((node_id for node_id in found if node_id in node_ids), min(node_ids))
 
 
 def farthest_node(graph: RouteGraph, start_id: int) -> int:

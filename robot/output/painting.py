@@ -6,26 +6,20 @@ from io import BytesIO
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from lemtomap import se2
+from lemtomap import palette, se2
 from lemtomap.areas.picture import paint as paint_areas
 from lemtomap.robot.output.files import grey_levels
 from lemtomap.robot.output.overview import Overview
 from lemtomap.se2 import Pose
 from lemtomap.topo.naming import shown
+from lemtomap.topo.whole.drawing import LABELS, WIDTHS, draw_graph, node_size
 from lemtomap.topo.whole.lettering import plain_text, write_name
-from lemtomap.types import EdgeType, GridView
+from lemtomap.types import GridView
 
-EDGE_STYLE = {
-    EdgeType.ODOMETRY: ("#2a9d8f", 1.4, "driven"),
-    EdgeType.NEAR_NEIGHBOUR: ("#e9a23b", 0.8, "near neighbour"),
-    EdgeType.LOOP_CLOSING: ("#d62828", 2.2, "loop closing"),
-}
-NODE_COLOUR, PATH_COLOUR, ROBOT_COLOUR = "#1d3557", "#457b9d", "#d62828"
 TITLE = 100  # characters
 LONGEST_SIDE_CELLS = 2500  # of the wall picture; more is beyond the paper's resolution
 
@@ -54,10 +48,10 @@ def _draw_whole(axes: Axes, overview: Overview) -> None:
     """Draw the map of the whole drive: walls, trajectory, graph."""
     _draw_walls(axes, overview.walls)
     path = overview.trajectory
-    axes.plot(path[:, 0], path[:, 1], color=PATH_COLOUR, linewidth=0.8, alpha=0.7, zorder=2)
+    axes.plot(path[:, 0], path[:, 1], color=palette.TRAIL, linewidth=0.8, alpha=0.7, zorder=2)
     _draw_graph(axes, overview)
     corners = se2.transform(overview.T_map_grid, _corners(overview.grid))
-    axes.plot(corners[:, 0], corners[:, 1], color="#888888", linewidth=1, linestyle="--", zorder=2)
+    axes.plot(corners[:, 0], corners[:, 1], color=palette.WINDOW, linewidth=1, linestyle="--", zorder=2)
     shown = np.concatenate([overview.walls, path[:, :2]])
     low, high = (
         np.quantile(shown, 0.001, axis=0),
@@ -98,21 +92,9 @@ def _draw_walls(axes: Axes, walls: NDArray[np.floating]) -> None:
 
 def _draw_graph(axes: Axes, overview: Overview) -> None:
     """Draw nodes and edges, closures on top."""
-    for order, (kind, (colour, width, _)) in enumerate(EDGE_STYLE.items()):
-        ends = [
-            (overview.T_map_node[a][:2], overview.T_map_node[b][:2])
-            for a, b, edge_kind in overview.edges
-            if edge_kind == kind and a in overview.T_map_node and b in overview.T_map_node
-        ]
-        axes.add_collection(
-            LineCollection(ends, colors=colour, linewidths=width, zorder=3 + order, alpha=0.9)
-        )
-    if overview.T_map_node:
-        nodes = np.array([pose[:2] for pose in overview.T_map_node.values()])
-        size = float(np.clip(4000 / len(nodes), 3, 18))
-        axes.scatter(nodes[:, 0], nodes[:, 1], s=size, color=NODE_COLOUR, zorder=7, linewidths=0)
+    draw_graph(axes, overview.T_map_node, overview.edges)
     if overview.painting is not None and overview.T_map_node:
-        paint_areas(axes, overview.painting, overview.T_map_node, size)
+        paint_areas(axes, overview.painting, overview.T_map_node, node_size(len(overview.T_map_node)))
     for node_id, name in overview.names.items():
         if node_id in overview.T_map_node:
             write_name(axes, name, overview.T_map_node[node_id], xytext=(4, 4), fontsize=9, zorder=9)
@@ -121,7 +103,7 @@ def _draw_graph(axes: Axes, overview: Overview) -> None:
 def _draw_robot(axes: Axes, T_map_base: Pose, size_m: float) -> None:
     """Draw the robot where the drive ended, nose forward."""
     nose = se2.transform(T_map_base, size_m * np.array([[1.8, 0.0], [-0.9, 1.0], [-0.9, -1.0]]))
-    axes.fill(nose[:, 0], nose[:, 1], color=ROBOT_COLOUR, zorder=8)
+    axes.fill(nose[:, 0], nose[:, 1], color=palette.ROBOT, zorder=8)
 
 
 def _draw_window(axes: Axes, overview: Overview) -> None:
@@ -134,7 +116,7 @@ def _draw_window(axes: Axes, overview: Overview) -> None:
     if overview.T_map_node:
         nodes = np.array(list(overview.T_map_node.values()))[:, :2]
         nodes_grid = se2.transform(T_grid_map, nodes)
-        axes.scatter(nodes_grid[:, 0], nodes_grid[:, 1], s=10, color=NODE_COLOUR, linewidths=0)
+        axes.scatter(nodes_grid[:, 0], nodes_grid[:, 1], s=10, color=palette.NODE, linewidths=0)
     _draw_robot(axes, se2.compose(T_grid_map, overview.trajectory[-1]), 0.35)
     axes.set_xlim(x0, x1)
     axes.set_ylim(y0, y1)
@@ -161,21 +143,27 @@ def _legend(overview: Overview) -> list[Line2D]:
     """Return one line per thing drawn, with its count."""
     kinds = [kind for _, _, kind in overview.edges]
     return [
-        Line2D([], [], color=PATH_COLOUR, linewidth=1, label="trajectory"),
+        Line2D([], [], color=palette.TRAIL, linewidth=1, label="trajectory"),
         Line2D(
             [],
             [],
-            color=NODE_COLOUR,
+            color=palette.NODE,
             marker="o",
             linestyle="",
             markersize=4,
             label=f"nodes ({len(overview.T_map_node)})",
         ),
         *(
-            Line2D([], [], color=colour, linewidth=width + 0.5, label=f"{label} edges ({kinds.count(kind)})")
-            for kind, (colour, width, label) in EDGE_STYLE.items()
+            Line2D(
+                [],
+                [],
+                color=colour,
+                linewidth=WIDTHS[kind] + 0.5,
+                label=f"{LABELS[kind]} edges ({kinds.count(kind)})",
+            )
+            for kind, colour in reversed(palette.EDGES.items())
         ),
-        Line2D([], [], color="#888888", linestyle="--", linewidth=1, label="window at the end"),
+        Line2D([], [], color=palette.WINDOW, linestyle="--", linewidth=1, label="window at the end"),
     ]
 
 

@@ -7,17 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from lemtomap import se2
+from lemtomap import palette, se2
 from lemtomap.robot.output.files import grey_levels, write_whole
-from lemtomap.types import EdgeType, MapView
+from lemtomap.types import MapView
 
 SCALE = 2  # pixels a cell
-EDGE_COLOURS = {
-    EdgeType.NEAR_NEIGHBOUR: (233, 162, 59),
-    EdgeType.ODOMETRY: (42, 157, 143),
-    EdgeType.LOOP_CLOSING: (214, 40, 40),
-}
-NODE, HERE, ROBOT = (29, 53, 87), (255, 0, 128), (214, 40, 40)
 
 
 def draw_preview(path: Path, view: MapView) -> None:
@@ -28,13 +22,13 @@ def draw_preview(path: Path, view: MapView) -> None:
     for _, a, b, kind in view.edges:
         if a in view.T_grid_node and b in view.T_grid_node:
             ends = _pixels(view, np.array([view.T_grid_node[a][:2], view.T_grid_node[b][:2]]))
-            draw.line([tuple(end) for end in ends.tolist()], fill=EDGE_COLOURS[kind], width=2)
+            draw.line([tuple(end) for end in ends.tolist()], fill=palette.EDGES[kind], width=2)
     for node_id, pose in view.T_grid_node.items():
         ((x, y),) = _pixels(view, pose[None, :2]).tolist()
-        colour = HERE if node_id == view.associated_id else NODE
+        colour = palette.HERE if node_id == view.associated_id else palette.NODE
         draw.ellipse((x - 4, y - 4, x + 4, y + 4), fill=colour)
     nose = se2.transform(view.T_grid_base, np.array([[0.4, 0.0], [-0.2, 0.22], [-0.2, -0.22]]))
-    draw.polygon([tuple(corner) for corner in _pixels(view, nose).tolist()], fill=ROBOT)
+    draw.polygon([tuple(corner) for corner in _pixels(view, nose).tolist()], fill=palette.ROBOT)
     data = BytesIO()
     picture.save(data, format="PNG", compress_level=1)
     write_whole(path, data.getvalue())

@@ -16,10 +16,11 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from lemtomap import palette
 from lemtomap.nav.types import CostmapView
 from lemtomap.robot.devices.parts import DEFAULT_LIMIT, PartFiles
 from lemtomap.robot.output.viewer_config import ViewerConfig
-from lemtomap.robot.output.viewer_layout import ABOUT, EDGE_COLOURS, blueprint
+from lemtomap.robot.output.viewer_layout import ABOUT, blueprint
 from lemtomap.robot.output.viewer_pipe import ViewerPipe
 from lemtomap.robot.output.viewer_truth import TruthView
 from lemtomap.robot.output.viewer_window import ViewerWindow
@@ -273,9 +274,8 @@ class Viewer:
         ids = list(view.T_grid_node)
         places = np.array([view.T_grid_node[i] for i in ids]).reshape(-1, 3)[:, :2]
         here = np.array([i == view.associated_id for i in ids], dtype=bool)
-        colours = np.where(here[:, None], np.array([[255, 0, 128]]), np.array([[30, 90, 200]])).astype(
-            np.uint8
-        )
+        own, other = (np.array(palette.rgb(colour), np.uint8) for colour in (palette.HERE, palette.NODE))
+        colours = np.where(here[:, None], own, other)
         labels = [view.names.get(i) or str(i) for i in ids]
         nodes = rr.Points3D(
             _lift(places, Z_NODES),
@@ -298,7 +298,8 @@ class Viewer:
             ]
             width = 0.06 if kind is EdgeType.LOOP_CLOSING else 0.02
             self._stream.log(
-                f"grid/graph/{kind.value}", rr.LineStrips3D(strips, radii=width, colors=EDGE_COLOURS[kind])
+                f"grid/graph/{kind.value}",
+                rr.LineStrips3D(strips, radii=width, colors=palette.rgb(palette.EDGES[kind])),
             )
 
     def _log_particles(self, view: MapView) -> None:

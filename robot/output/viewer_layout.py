@@ -5,14 +5,9 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from lemtomap.types import EdgeType
+from lemtomap import palette
+from lemtomap.palette import rgb
 
-EDGE_COLOURS = {
-    EdgeType.ODOMETRY: [42, 157, 143],
-    EdgeType.NEAR_NEIGHBOUR: [233, 162, 59],
-    EdgeType.LOOP_CLOSING: [214, 40, 40],
-}
-ROUTE_COLOUR, PATH_COLOUR, SCAN_COLOUR = [255, 0, 128], [0, 200, 83], [214, 40, 40]
 EYE_HEIGHT_M = 17.0  # shows a 20 m window whole
 
 ABOUT = """\
@@ -24,7 +19,7 @@ ABOUT = """\
 | red disc, white arrow | the robot and its heading |
 | red dots | the laser scan |
 | orange arrows | the particles: where else it may be |
-| blue dots | topological nodes; **pink** is the associated one |
+| dark blue dots | topological nodes; **pink** is the associated one |
 | green, amber, red lines | edges: driven, near neighbour, loop closing |
 | pink line | the route over nodes |
 | green line, green dot | the way to the sliding goal |
@@ -129,8 +124,8 @@ def _eye(height_m: float, x_m: float = 0.0, y_m: float = 0.0) -> rrb.EyeControls
 def _styles() -> dict[Any, list[rrb.VisualizableArchetype]]:
     """Return the colours of everything whose data does not carry one."""
     return {
-        "grid/robot/scan": [rr.Points3D.from_fields(colors=SCAN_COLOUR, radii=0.03)],
-        "grid/plan/route": [rr.LineStrips3D.from_fields(colors=ROUTE_COLOUR, radii=0.05)],
-        "grid/plan/path": [rr.LineStrips3D.from_fields(colors=PATH_COLOUR, radii=0.035)],
-        "grid/plan/goal": [rr.Points3D.from_fields(colors=PATH_COLOUR, radii=0.12)],
+        "grid/robot/scan": [rr.Points3D.from_fields(colors=rgb(palette.SCAN), radii=0.03)],
+        "grid/plan/route": [rr.LineStrips3D.from_fields(colors=rgb(palette.ROUTE), radii=0.05)],
+        "grid/plan/path": [rr.LineStrips3D.from_fields(colors=rgb(palette.PATH), radii=0.035)],
+        "grid/plan/goal": [rr.Points3D.from_fields(colors=rgb(palette.PATH), radii=0.12)],
     }

@@ -1,7 +1,6 @@
 """What it costs to go and look into an opening, in metres of way: through the window, or along the edges."""
 
-import heapq
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap import se2
+from lemtomap.dijkstra import CheapestFirst
 from lemtomap.nav.config import ExploreConfig
 from lemtomap.nav.kernels import fields as kernels
 from lemtomap.nav.motion.metric import Reach, top_cost
 from lemtomap.se2 import Pose
 from lemtomap.topo.graph import Placeholder
-from lemtomap.types import MapView, RouteGraph
+from lemtomap.types import MapView, RouteEdge, RouteGraph
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,22 +95,13 @@ def _by_route(openings: Sequence[Placeholder], here: Here) -> dict[int, float]:
 def _nearest_along_edges(
     wanted: dict[int, list[Placeholder]], here: Here, *, closed_too: bool
 ) -> dict[int, float]:
-    start_id = here.map_view.associated_id
-    best = {start_id: 0.0}
-    heap = [(0.0, start_id)]
-    settled: set[int] = set()
-    while heap:
-        way_m, node_id = heapq.heappop(heap)
-        if node_id in settled:
-            continue
-        settled.add(node_id)
-        if node_id in wanted:
-            return {p.placeholder_id: way_m + float(np.hypot(p.x_m, p.y_m)) for p in wanted[node_id]}
+    def steps_from(node_id: int) -> Iterator[tuple[int, float, RouteEdge]]:
         for edge in here.graph.edges_of(node_id):
-            if edge.blocked_until_s > here.now_s and not closed_too:
-                continue
-            further_m = way_m + edge.length_m
-            if further_m < best.get(edge.other_id, np.inf):
-                best[edge.other_id] = further_m
-                heapq.heappush(heap, (further_m, edge.other_id))
+            if closed_too or edge.blocked_until_s <= here.now_s:
+                yield edge.other_id, edge.length_m, edge
+
+    for found in CheapestFirst(here.map_view.associated_id, steps_from):
+        if found.node_id in wanted:
+            there = wanted[found.node_id]
+            return {p.placeholder_id: found.cost + float(np.hypot(p.x_m, p.y_m)) for p in there}
     return {}

@@ -1,4 +1,4 @@
-"""Jitted shortest ways over a compact graph.
+"""Jitted shortest ways over a compact graph, for maps of a million nodes; over smaller ones see dijkstra.
 
 Arc 2e leads from an edge's source to its target, arc 2e + 1 back; a node's arcs form a chain:
 first_arc[node], then next_arc[arc], until -1. Price is per edge, inf where closed.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lemtomap.errors import NoRoute
 from lemtomap.nav.config import RouteConfig
 from lemtomap.nav.kernels import route as kernels
-from lemtomap.nav.route.planner import Route
+from lemtomap.nav.route.planner import Route, price_s
 from lemtomap.types import EdgeTable, RouteEdge
 
 Column = NDArray[Any]
@@ -60,11 +60,8 @@ class RouteNetwork:
             return
         self._make_room(int(max(edges.source_id.max(), edges.target_id.max())), int(ids.max()))
         new = ~self._chained[ids]
-        share, usual_mps = self._config.learnt_weight, self._config.usual_speed_mps
-        price = share * edges.time_s + (1.0 - share) * edges.length_m / usual_mps
-        if edges.proven is not None:
-            price = price + self._config.unproven_s * ~edges.proven
         self._proven[ids] = True if edges.proven is None else edges.proven
+        price = price_s(edges.time_s, edges.length_m, self._proven[ids].astype(np.float32), self._config)
         self._length_m[ids], self._time_s[ids] = edges.length_m, edges.time_s
         self._open_price[ids] = np.maximum(price, 1e-3)
         self._note_blocked(edges)

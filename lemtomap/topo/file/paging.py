@@ -119,6 +119,8 @@ class PagedGraph:
     def reach(self, start_id: int, radius_m: float, limit: int = 1 << 30) -> dict[int, Reached]:
         """Return the nodes within a topological distance of one node, nearest first (Dijkstra).
 
+        A loop of its own beside dijkstra.CheapestFirst: every scan asks, and equal ways must tie in whatever
+        frame they were measured.
         Holds: a node's `via` comes from a node earlier in the result.
         """
         reached: dict[int, Reached] = {}

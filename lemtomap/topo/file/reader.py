@@ -16,10 +16,10 @@ from lemtomap.topo.file.rows import (
     type_code,
 )
 from lemtomap.topo.graph import (
-    USUAL_SPEED_MPS,
     Mark,
     Placeholder,
     detour,
+    straight_s,
 )
 from lemtomap.topo.naming import LONGEST_NUMBER
 from lemtomap.types import EdgeTable, EdgeType, RouteEdge
@@ -113,7 +113,7 @@ class TopoReader:
         edges = []
         for edge_id, other_id, time_s, blocked_s, measure, code in rows:
             length_m = planar_length_m(measure)
-            expected_s = length_m / USUAL_SPEED_MPS * _DETOURS[code] if time_s is None else time_s
+            expected_s = straight_s(length_m, float(_DETOURS[code])) if time_s is None else time_s
             proven = time_s is not None or code != _CLOSURE
             edges.append(RouteEdge(edge_id, other_id, length_m, expected_s, blocked_s or 0.0, proven))
         return tuple(edges)
@@ -201,13 +201,13 @@ def _table(rows: Sequence[tuple[Any, ...]]) -> EdgeTable:
     values = np.frombuffer(b"".join(measure), dtype=_MEASURE)
     length_m = np.hypot(values["x"], values["y"])
     learnt_s = np.array(time, dtype=np.float64)  # None becomes NaN
-    straight_s = length_m / USUAL_SPEED_MPS * _DETOURS[np.array(code, dtype=np.intp)]
+    undriven_s = straight_s(length_m, _DETOURS[np.array(code, dtype=np.intp)])
     return EdgeTable(
         edge_id=np.array(edge_id, dtype=np.int64),
         source_id=np.array(source, dtype=np.int64),
         target_id=np.array(target, dtype=np.int64),
         length_m=length_m.astype(np.float32),
-        time_s=np.where(np.isnan(learnt_s), straight_s, learnt_s).astype(np.float32),
+        time_s=np.where(np.isnan(learnt_s), undriven_s, learnt_s).astype(np.float32),
         blocked_until_s=np.nan_to_num(np.array(blocked, dtype=np.float64)),
         proven=~np.isnan(learnt_s) | (np.array(code, dtype=np.intp) != _CLOSURE),
     )

@@ -5,15 +5,16 @@ from it to the node asked for. The sums of heading variance and its first and se
 to first order, for every pair of nodes, in one pass without matrices.
 """
 
-import heapq
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from math import cos, sin
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.dijkstra import CheapestFirst
 from lemtomap.se2 import Pose, between
 from lemtomap.topo.graph import DirectedEdge
 from lemtomap.topo.loops.config import GateConfig
@@ -64,16 +65,14 @@ class GraphUncertainty:
         self._graph = graph
         self._config = config
         self._known: dict[int, _Known] = {}
-        self._queue: list[tuple[float, int, int, int, DirectedEdge | None]] = [(0.0, 0, anchor_id, 0, None)]
-        """Doubt of the way, running number, node, the node before it and the edge from there."""
-        self._pushed = 0
+        self._search = CheapestFirst(anchor_id, self._steps_from)
         self._ids: list[int] = []
         self._rows = np.empty((64, 11))
 
     @property
     def done(self) -> bool:
         """Whether every node that counts has been reached."""
-        return not self._queue or len(self._known) >= self._config.outlook_nodes
+        return self._search.is_over or len(self._known) >= self._config.outlook_nodes
 
     def __len__(self) -> int:
         return len(self._known)
@@ -83,12 +82,9 @@ class GraphUncertainty:
 
     def advance(self, nodes: int) -> bool:
         """Reach up to `nodes` more; return True when done."""
-        while nodes > 0 and self._queue and len(self._known) < self._config.outlook_nodes:
-            cost, _, node_id, via_id, leg = heapq.heappop(self._queue)
-            if node_id not in self._known:
-                nodes -= 1
-                known = _START if leg is None else self._after(self._known[via_id], leg, via_id)
-                self._settle(node_id, known, cost)
+        room = self._config.outlook_nodes - len(self._known)
+        for node_id, _, via_id, leg in islice(self._search, max(0, min(nodes, room))):
+            self._add(node_id, _START if leg is None else self._after(self._known[via_id], leg, via_id))
         return self.done
 
     def extend(self, node_id: int) -> None:
@@ -102,19 +98,18 @@ class GraphUncertainty:
         ]
         if ways:
             doubt, via_id, back = min(ways, key=lambda way: way[0])
-            self._settle(node_id, self._after(self._known[via_id], back, via_id), doubt)
+            self._add(node_id, self._after(self._known[via_id], back, via_id))
+            self._search.settle(node_id, doubt)
 
-    def _settle(self, node_id: int, known: _Known, cost: float) -> None:
+    def _add(self, node_id: int, known: _Known) -> None:
         self._known[node_id] = known
         if len(self._ids) == len(self._rows):
             self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
         self._rows[len(self._ids)] = (known.x_m, known.y_m, known.yaw_rad, known.way_m, *known.sums)
         self._ids.append(node_id)
-        for leg in self._graph.legs_of(node_id):
-            if leg.other_id not in self._known:
-                self._pushed += 1
-                doubt = cost + self._doubt(leg)
-                heapq.heappush(self._queue, (doubt, self._pushed, leg.other_id, node_id, leg))
+
+    def _steps_from(self, node_id: int) -> Iterator[tuple[int, float, DirectedEdge]]:
+        return ((leg.other_id, self._doubt(leg), leg) for leg in self._graph.legs_of(node_id))
 
     def _doubt(self, leg: DirectedEdge) -> float:
         """Return what crossing an edge costs: well measured ways win."""

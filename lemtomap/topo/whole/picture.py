@@ -7,25 +7,20 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from lemtomap import palette
 from lemtomap.errors import BadInput
 from lemtomap.se2 import Pose
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
 from lemtomap.topo.naming import shown
+from lemtomap.topo.whole.drawing import LABELS, draw_edges, draw_nodes
 from lemtomap.topo.whole.export import APPROXIMATE, write_whole
 from lemtomap.topo.whole.layout import lay_out
 from lemtomap.topo.whole.lettering import plain_text, write_name
 from lemtomap.types import EdgeType
 
-COLOURS = {
-    EdgeType.NEAR_NEIGHBOUR: "#b8c4d0",
-    EdgeType.ODOMETRY: "#3b6ea5",
-    EdgeType.LOOP_CLOSING: "#d1495b",
-}
-CLOSED, UNPROVEN = "#14213d", "#d1495b"
 MAX_INCHES = 16.0
 
 
@@ -55,20 +50,21 @@ def _drawn(store: TopoStore, paint: Callable[[Axes, Mapping[int, Pose]], None] |
     figure = Figure(figsize=(float(size[0]), float(size[1])), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(aspect="equal", xlabel="x, m", ylabel="y, m")
-    open_edges, closed, unproven = _sorted(list(store.edges()))
-    kinds = [(kind.value.replace("_", " "), colour, "-") for kind, colour in COLOURS.items()]
-    styles = [*kinds, ("closed by hand", CLOSED, ":"), ("loop closing, not driven yet", UNPROVEN, ":")]
-    for (label, colour, style), edges in zip(styles, (*open_edges, closed, unproven), strict=True):
-        lines = [
-            [layout.T_map_node[edge.source_id][:2], layout.T_map_node[edge.target_id][:2]] for edge in edges
-        ]
-        if lines or style == "-":
-            axes.add_collection(
-                LineCollection(
-                    lines, colors=colour, linewidths=1.2, linestyles=style, label=f"{label} ({len(lines)})"
-                )
-            )
-    axes.plot(at[:, 0], at[:, 1], ".", color="#14213d", markersize=4, label=f"nodes ({len(at)})")
+    edges = list(store.edges())
+    ways = [edge for edge in edges if not edge.is_closed and edge.is_proven]
+    for kind in palette.EDGES:
+        ends = [_ends(edge) for edge in ways if edge.type is kind]
+        draw_edges(axes, layout.T_map_node, ends, kind, label=LABELS[kind])
+    closed = [_ends(edge) for edge in edges if edge.is_closed]
+    unproven = [_ends(edge) for edge in edges if not edge.is_closed and not edge.is_proven]
+    dotted = (
+        (closed, EdgeType.ODOMETRY, "closed by hand", palette.CLOSED),
+        (unproven, EdgeType.LOOP_CLOSING, "loop closing, not driven yet", ""),
+    )
+    for ends, kind, label, colour in dotted:
+        if ends:
+            draw_edges(axes, layout.T_map_node, ends, kind, label=label, colour=colour, dotted=True)
+    draw_nodes(axes, layout.T_map_node, label="nodes")
     for name, node_id in store.names().items():
         write_name(axes, name, layout.T_map_node[node_id], xytext=(5, 5))
     if paint is not None:
@@ -79,9 +75,5 @@ def _drawn(store: TopoStore, paint: Callable[[Axes, Mapping[int, Pose]], None] |
     return figure
 
 
-def _sorted(edges: list[Edge]) -> tuple[list[list[Edge]], list[Edge], list[Edge]]:
-    """Return the open ways by type, those closed by hand, and closures that nobody has driven."""
-    closed = [edge for edge in edges if edge.is_closed]
-    unproven = [edge for edge in edges if not edge.is_closed and not edge.is_proven]
-    ways = [edge for edge in edges if not edge.is_closed and edge.is_proven]
-    return [[edge for edge in ways if edge.type is kind] for kind in COLOURS], closed, unproven
+def _ends(edge: Edge) -> tuple[int, int]:
+    return edge.source_id, edge.target_id

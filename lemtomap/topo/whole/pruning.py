@@ -5,7 +5,6 @@ drifted. A node goes when an older one stands next to it, no wall between, and e
 as short without it. Named nodes stay, and those that somebody or something points at.
 """
 
-import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -13,6 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.dijkstra import CheapestFirst
 from lemtomap.se2 import Pose
 from lemtomap.topo.file.paging import PagedGraph, chain
 from lemtomap.topo.file.store import TopoStore
@@ -117,21 +117,14 @@ def _ways_stay(graph: PagedGraph, node_id: int, config: PruneConfig) -> bool:
 
 
 def _joined_without(graph: PagedGraph, ends: tuple[int, int], without_id: int, limit_m: float) -> bool:
-    """Return True if a way of at most this length joins two nodes without a third (Dijkstra)."""
+    """Return True if a way of at most this length joins two nodes without a third."""
     start, goal = ends
-    queue, done = [(0.0, start)], {without_id}
-    while queue:
-        way_m, node_id = heapq.heappop(queue)
-        if node_id == goal:
-            return True
-        if node_id in done:
-            continue
-        done.add(node_id)
-        for edge in graph.edges_of(node_id):
-            further_m = way_m + _way_m(edge)
-            if edge.other(node_id) not in done and further_m <= limit_m:
-                heapq.heappush(queue, (further_m, edge.other(node_id)))
-    return False
+
+    def steps_from(node_id: int) -> Iterator[tuple[int, float, Edge]]:
+        ways = ((edge.other(node_id), _way_m(edge), edge) for edge in graph.edges_of(node_id))
+        return (way for way in ways if way[0] != without_id)
+
+    return any(found.node_id == goal for found in CheapestFirst(start, steps_from, limit_m))
 
 
 def _way_m(edge: Edge) -> float:

@@ -8,12 +8,12 @@ import pytest
 from lemtomap.errors import NoRoute
 from lemtomap.nav.config import RouteConfig
 from lemtomap.nav.route.network import RouteNetwork
-from lemtomap.nav.route.planner import plan_route
+from lemtomap.nav.route.planner import edge_cost_s, plan_route, price_s
 from lemtomap.nav.route.planning import RoutePlanner, table_of
 from lemtomap.topo.file.reader import TopoReader
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
-from lemtomap.types import EdgeType
+from lemtomap.types import EdgeType, RouteEdge
 from tests.lemtomap.nav.world import Graph, World
 
 CONFIG = RouteConfig()
@@ -111,3 +111,16 @@ def test_the_closure_that_found_the_robot_joins_the_map_before_it_is_on_file():
         RoutePlanner(CONFIG).plan(graph, view, 1, 0.0, {})
     joined = replace(view, edges=[*view.edges, (101, 9, 2, EdgeType.LOOP_CLOSING)])
     assert RoutePlanner(CONFIG).plan(graph, joined, 1, 0.0, {}).nodes == (9, 2, 1)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_an_edge_costs_the_same_alone_and_in_a_table_proven_or_not(share):
+    config = RouteConfig(learnt_weight=share)
+    edges = [RouteEdge(1, 2, 1.0, 9.0), RouteEdge(2, 3, 4.0, 10.0, proven=False), RouteEdge(3, 4, 0.5, 1.0)]
+    names = ("time_s", "length_m", "proven")
+    columns = [np.array([getattr(edge, name) for edge in edges], float) for name in names]
+    assert price_s(*columns, config) == pytest.approx([edge_cost_s(edge, config) for edge in edges])
+    known = [share * edge.time_s + (1.0 - share) * edge.length_m / config.usual_speed_mps for edge in edges]
+    assert price_s(*columns, config) == pytest.approx(
+        np.array(known) + np.array([0.0, config.unproven_s, 0.0])
+    )

@@ -187,7 +187,7 @@ def test_what_is_sure_in_the_window_follows_every_change_of_a_standing(tmp_path)
 
 
 def test_nodes_out_of_the_window_stand_where_all_edges_together_have_them(tmp_path):
-    """Two ways to the third node that differ by 0.4 m: it stands between, and not where the first one ends."""
+    """Two ways to the third node, 0.4 m apart: it stands between, not where the first one ends."""
     with TopoStore.create(tmp_path / "map.lemto") as store:
         nodes = [store.add_node().node_id for _ in range(3)]
         for a, b, length_m in ((0, 1, 1.0), (1, 2, 1.0), (0, 2, 2.4)):

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import yaml
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -17,9 +16,10 @@ from lemtomap.se2 import (
     transform,
 )
 from lemtomap.sim import worlds
+from lemtomap.topo.whole.drawing import draw_graph
+from lemtomap.types import EdgeType
 from tools.truth.tour_error import truth_and_odometry
 
-EDGE_COLOURS = ("#1d5fa8", "#9db8d6", "#c0392b")  # as EdgeType lists them: odometry, near, loop
 MARGIN_M = 3.0
 
 
@@ -69,10 +69,8 @@ def _draw_graph(axes: Any, folder: Path, T_world_map: Pose) -> None:
         node, edge, walls = saved["node"], saved["edge"], saved["walls"]
     axes.plot(*transform(T_world_map, walls).T, ".", markersize=0.6, color="#555555")
     place = {int(row[0]): transform(T_world_map, row[1:3]) for row in node}
-    for kind in (1, 0, 2):
-        lines = [(place[a], place[b]) for a, b, number in edge.tolist() if number == kind]
-        axes.add_collection(LineCollection(lines, colors=EDGE_COLOURS[kind], linewidths=1.0))
-    axes.plot(*np.array(list(place.values())).T, "o", markersize=2.2, color="#1d5fa8")
+    kinds = list(EdgeType)
+    draw_graph(axes, place, [(a, b, kinds[number]) for a, b, number in edge.tolist()])
 
 
 def _draw_grid(axes: Any, folder: Path, T_world_map: Pose) -> None:
