@@ -12,6 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.areas.segmentation import AreaSegmenter
 from lemtomap.displacement import Watch
 from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam, SlamConfig
 from lemtomap.samples import as_finite, as_points, as_whole, check_kind
@@ -87,7 +88,8 @@ class Mapper:
         known = Path(path).exists()
         store = (TopoStore.open if known else TopoStore.create)(path)
         make_slam = partial(SLAMS[DEFAULT_SLAM], slam or SlamConfig(), seed)
-        return cls(make_slam, TopoMapper(topo or TopoConfig(), store, recogniser=LoopRecogniser(loops)))
+        recogniser, areas = LoopRecogniser(loops), AreaSegmenter()
+        return cls(make_slam, TopoMapper(topo or TopoConfig(), store, recogniser=recogniser, areas=areas))
 
     def __enter__(self) -> Self:
         return self

@@ -1,5 +1,6 @@
 """Putting the halves of a mapper together from settings: all that a recorded log needs of a robot."""
 
+from lemtomap.areas.segmentation import AreaSegmenter
 from lemtomap.errors import BadSetting
 from lemtomap.grid import SLAMS, GridSlam
 from lemtomap.robot.config import RobotConfig
@@ -22,4 +23,5 @@ def build_topo(slam: str, config: RobotConfig, store: TopoStore) -> TopoMapper:
     The growing grid closes its own loops and is far too large to search.
     """
     recogniser = None if slam == "gmapping" else LoopRecogniser(config.loops)
-    return TopoMapper(config.topo, store, recogniser=recogniser)
+    areas = None if slam == "gmapping" else AreaSegmenter(config.areas)
+    return TopoMapper(config.topo, store, recogniser=recogniser, areas=areas)

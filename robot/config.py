@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
 
+from lemtomap.areas.config import AreaConfig
 from lemtomap.baseline.config import AmclConfig
 from lemtomap.drivers.driver import DriverConfig
 from lemtomap.drivers.hokuyo.session import HokuyoConfig
@@ -122,6 +123,7 @@ class RobotConfig:
     smoother: SmootherConfig = field(default_factory=SmootherConfig)
     explore: ExploreConfig = field(default_factory=ExploreConfig)
     loops: LoopConfig = field(default_factory=LoopConfig)
+    areas: AreaConfig = field(default_factory=AreaConfig)
     docking: DockingConfig = field(default_factory=DockingConfig)
     retreat: ReflexConfig = field(default_factory=ReflexConfig)
     teleop: TeleopConfig = field(default_factory=TeleopConfig)

@@ -25,6 +25,10 @@ class ClosableGraph(RouteGraph, Protocol):
         """Return the node that bears this name."""
         ...
 
+    def area_nodes(self, place: str) -> list[int]:
+        """Return the nodes of the area that `area:N` or a name means; empty: there is none."""
+        ...
+
     def close(self) -> None:
         """Close the file."""
         ...

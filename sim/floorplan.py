@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from lemtomap.sim.errors import BadStart, BadWorld
 from lemtomap.sim.faults import Faults
 from lemtomap.sim.raster import FAR_M, SPAWN_CLEARANCE_M, find_spawn, fits, rasterise
-from lemtomap.sim.world import Box, Door, GroundTruth, Mover, Pose2, Room, Surface, World
+from lemtomap.sim.truth.model import Doorway, GroundTruth, Room
+from lemtomap.sim.world import Box, Mover, Pose2, Surface, World
 
 WALL_THICKNESS_M = 0.12
 WALL_HEIGHT_M = 2.4
@@ -86,7 +87,7 @@ class FloorPlan:
         self._walls: list[_Wall] = []
         self._boxes: list[Box] = []
         self._rooms: list[Room] = []
-        self._doors: list[Door] = []
+        self._doors: list[Doorway] = []
         self._movers: list[Mover] = []
 
     def wall(
@@ -130,7 +131,7 @@ class FloorPlan:
         rooms: tuple[str, str],
         *,
         width_m: float = DOOR_WIDTH_M,
-    ) -> Door:
+    ) -> Doorway:
         """Cut a doorway into the wall through `at`. Raises BadWorld when no wall is there."""
         for wall in self._walls:
             if wall.base_m != self._base_m:
@@ -139,14 +140,14 @@ class FloorPlan:
             if off <= wall.thickness_m and width_m / 2 <= along <= wall.length_m - width_m / 2:
                 low, high = along - width_m / 2, along + width_m / 2
                 wall.gaps.append((low, high))
-                door = Door(name, (wall.at(low), wall.at(high)), rooms)
+                door = Doorway(name, (wall.at(low), wall.at(high)), rooms, level=self.level)
                 self._doors.append(door)
                 return door
         raise BadWorld(f"{self.name}: door '{name}' at ({at[0]:g}, {at[1]:g}) lies in no wall")
 
     def opening(self, name: str, start: Point, end: Point, rooms: tuple[str, str]) -> None:
         """Note a passage without a wall, as wide as the room."""
-        self._doors.append(Door(name, (start, end), rooms))
+        self._doors.append(Doorway(name, (start, end), rooms, "opening", level=self.level))
 
     def room(self, name: str, low: Point, high: Point, *, kind: str = "room") -> None:
         """Name a rectangle as ground truth."""

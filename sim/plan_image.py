@@ -5,8 +5,10 @@ mode, and so is the grey 205 of the map savers whatever the thresholds say.
 """
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from lemtomap.sim.errors import BadWorld
 from lemtomap.sim.plan_settings import Mode, PlanSettings
 from lemtomap.sim.text_file import require_file
 
+T = TypeVar("T")
 MAX_PIXELS = 25_000_000  # 250 m x 250 m at 0.05 m
 MAX_PLAIN_PIXELS = 4_000_000  # of PGM as text: read at a million a second
 FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF", "TIFF")  # others start programs, or are no drawings
@@ -72,13 +75,29 @@ def _is_peak(floor: NDArray[np.float32], count: int, resolution_m: float) -> boo
 
 def _read_image(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Return brightness from 0 to 1, float32 (rows, cols), top row first, and which pixels are opaque."""
+    return _decoded(path, _brightness)
+
+
+def read_labels(path: Path) -> NDArray[np.int32]:
+    """Return the numbers in an image of labels, int32 (rows, cols), top row first. Raises BadWorld."""
+    return _decoded(path, _numbers)
+
+
+def _numbers(path: Path, image: Image.Image) -> NDArray[np.int32]:
+    if image.mode not in {"1", "L", "P"} and not image.mode.startswith("I"):
+        raise BadWorld(f"{path}: labels must be numbers, 8 or 16 bits a pixel, not {image.mode}")
+    return np.asarray(image).astype(np.int32)
+
+
+def _decoded(path: Path, take: Callable[[Path, Image.Image], T]) -> T:
+    """Return what `take` makes of an image within limits. Raises BadWorld."""
     require_file(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of broken metadata; of size, which has its own limit here
             with Image.open(path, formats=FORMATS) as image:
                 _check_size(path, image)
-                return _brightness(path, image)
+                return take(path, image)
     except (Image.DecompressionBombError, MemoryError) as error:
         raise BadWorld(f"{path}: the image is too large") from error
     except UnidentifiedImageError as error:

@@ -19,12 +19,13 @@ from lemtomap.sim.raster import (
     fits,
     require_cells,
 )
-from lemtomap.sim.ros_truth import read_truth
+from lemtomap.sim.truth.beside import PlanFrame, read_truth
 from lemtomap.sim.turned import turned
 from lemtomap.sim.world import Pose2, Raster, World
 
 WALL_HEIGHT_M = 1.0
 SOLID_M2 = 0.25  # unmapped ground of that size is what nobody could look into; less is a speck of the mapping
+WITHOUT = "driving without rooms as ground truth"
 GAP_M = 2.5  # between copies and round them
 KNOWN_SPAWNS: dict[str, Pose2] = {
     "willowgarage_perfect": (6.0, -16.0, 0.0)
@@ -45,14 +46,19 @@ def load_ros_map(path: Path) -> World:
         raster = Raster(ground.occupied, ground.free, step, (x0 + col * step, y0 + row * step))
         spawn = _spawn(raster, ground.wall, path)
         raster = replace(raster, free=connected(raster, spawn[:2]))
+        rows, cols = drawing.floor.shape
+        truth = read_truth(path.parent, PlanFrame((x0, y0), step, rows, cols))
         world = World(
             name=path.stem,
             boxes=boxes_from_raster(raster, WALL_HEIGHT_M),
             raster=raster,
             spawn=spawn,
-            truth=read_truth(path.parent, (x0, y0 + len(drawing.floor) * step), step),
+            truth=truth,
             description=f"ROS map {path.name}",
-            remarks=drawing.remarks,
+            remarks=(
+                *drawing.remarks,
+                *(f"{line}; driving without rooms as ground truth" for line in truth.damage),
+            ),
         )
         return turned(world, (x0, y0), yaw) if yaw else world
     except BadWorld as error:

@@ -16,7 +16,7 @@ KEYS: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     "": (frozenset({"name"}), frozenset({"map", "spawn", "dock", "description", "faults"})),
     "wall": (frozenset({"points"}), frozenset({"surface", "thickness", "height"})),
     "room": (frozenset({"name", "low", "high"}), frozenset({"kind"})),
-    "door": (frozenset({"at", "rooms"}), frozenset({"name", "width", "leaf", "period"})),
+    "door": (frozenset({"at", "rooms"}), frozenset({"name", "width", "leaf", "period", "open"})),
     "furniture": (frozenset({"kind", "at"}), frozenset({"moved"})),
     "person": (frozenset({"points"}), frozenset({"speed", "pause"})),
     "barrier": (frozenset({"from", "to", "during"}), frozenset()),

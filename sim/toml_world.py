@@ -14,7 +14,12 @@ high = [4, 5]
 [[door]]
 at = [4.0, 2.5]
 rooms = ["kitchen", "hall"]
-leaf = "swings"                        # none (default), swings, closed
+leaf = "swings"                        # none (default), swings, closed, slides
+[[door]]
+at = [4.0, 4.0]
+rooms = ["kitchen", "hall"]
+leaf = "slides"
+open = [[0, 30], [60, 90]]             # seconds; without it, it changes at random every `period` or so
 [[furniture]]
 kind = "table"                         # cabinet, table, chair, sofa, crate
 at = [2.0, 1.0, 0.3]
@@ -47,6 +52,7 @@ from lemtomap.sim.faults import Faults, LinkFaults, Window
 from lemtomap.sim.floorplan import FloorPlan
 from lemtomap.sim.movers import Appearing, Person, SwingDoor
 from lemtomap.sim.ros_map import load_ros_map
+from lemtomap.sim.sliding import SlidingDoor
 from lemtomap.sim.text_file import read_text
 from lemtomap.sim.toml_entry import KEYS, MAX_ITEMS, MAX_TABLES, TomlEntry
 from lemtomap.sim.world import Box, Pose2, Surface, World
@@ -152,13 +158,21 @@ def _door(plan: FloorPlan, entry: TomlEntry, _day: int) -> None:
         door = plan.door(name, entry.point("at"), (a, b), width_m=width)
     except BadWorld as error:
         raise entry.refuse(f"door '{name}' at {entry.values['at']} lies in no wall", "at") from error
-    leaf = entry.choice("leaf", "none", ["none", "swings", "closed"])
+    leaf = entry.choice("leaf", "none", ["none", "swings", "closed", "slides"])
+    if leaf != "slides" and "open" in entry.values:
+        raise entry.refuse("'open' is for a leaf that slides", "open")
     if leaf == "none":
         return
     (x0, y0), (x1, y1) = door.ends
     yaw = math.atan2(y1 - y0, x1 - x0)
     share = 0.0 if leaf == "closed" else 0.5
     period = entry.number_of("period", 60.0, 5.0, 1e6)
+    if leaf == "slides":
+        times = [entry.checked(item, "open", 2) for item in entry.items("open", "[from, to]")]
+        if any(begin_s >= end_s for begin_s, end_s in times):
+            raise entry.refuse("'open' must be [from, to] with from before to", "open")
+        plan.mover(SlidingDoor(door.ends, tuple((begin_s, end_s) for begin_s, end_s in times), period))
+        return
     plan.mover(SwingDoor((x0, y0), yaw, math.dist(*door.ends) - 0.02, period, share))
 
 

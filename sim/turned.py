@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.sim.raster import connected, require_cells
-from lemtomap.sim.world import Box, Pose2, Raster, Room, World
+from lemtomap.sim.truth.model import Room
+from lemtomap.sim.world import Box, Pose2, Raster, World
 
 Point = tuple[float, float]
 
@@ -22,12 +23,13 @@ def turned(world: World, about: Point, yaw_rad: float) -> World:
     spawn = turn.pose(world.spawn)
     raster = replace(raster, free=connected(raster, spawn[:2]))
     rooms = tuple(turn.room(room) for room in world.truth.rooms)
+    image = world.truth.image and replace(world.truth.image, yaw_rad=yaw_rad)
     return replace(
         world,
         boxes=tuple(turn.box(box) for box in world.boxes),
         raster=raster,
         spawn=spawn,
-        truth=replace(world.truth, rooms=rooms),
+        truth=replace(world.truth, rooms=rooms, image=image),
     )
 
 

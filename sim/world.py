@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.sim.faults import Faults
+from lemtomap.sim.truth.model import GroundTruth
 
 Pose2 = tuple[float, float, float]
 """x m, y m, yaw rad."""
@@ -49,61 +50,6 @@ class Box:
     yaw_rad: float = 0.0
     pitch_rad: float = 0.0
     surface: Surface = Surface.WALL
-
-
-@dataclass(frozen=True, slots=True)
-class Room:
-    """Ground truth of one room."""
-
-    name: str
-    outline: tuple[tuple[float, float], ...]
-    """Corners in metres, counter-clockwise."""
-    kind: str = "room"
-    level: int = 0
-
-    def contains(self, x: float, y: float) -> bool:
-        """Return True if a point lies inside (even-odd rule)."""
-        inside = False
-        for (x0, y0), (x1, y1) in zip(self.outline, self.outline[1:] + self.outline[:1], strict=True):
-            if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
-                inside = not inside
-        return inside
-
-
-@dataclass(frozen=True, slots=True)
-class Door:
-    """Ground truth of one door: its two jambs and the two rooms it joins."""
-
-    name: str
-    ends: tuple[tuple[float, float], tuple[float, float]]
-    rooms: tuple[str, str]
-
-    @property
-    def centre(self) -> tuple[float, float]:
-        """Middle of the doorway, metres."""
-        (x0, y0), (x1, y1) = self.ends
-        return (x0 + x1) / 2, (y0 + y1) / 2
-
-
-@dataclass(frozen=True, slots=True)
-class GroundTruth:
-    """What a perfect map would know."""
-
-    rooms: tuple[Room, ...] = ()
-    doors: tuple[Door, ...] = ()
-
-    def graph(self) -> dict[str, set[str]]:
-        """Return the room graph: who is next to whom through a door."""
-        graph: dict[str, set[str]] = {room.name: set() for room in self.rooms}
-        for door in self.doors:
-            a, b = door.rooms
-            graph.setdefault(a, set()).add(b)
-            graph.setdefault(b, set()).add(a)
-        return graph
-
-    def room_at(self, x: float, y: float, level: int = 0) -> str | None:
-        """Return the name of the room around a point of one storey."""
-        return next((room.name for room in self.rooms if room.level == level and room.contains(x, y)), None)
 
 
 @dataclass(frozen=True, slots=True)

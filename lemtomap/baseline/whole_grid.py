@@ -44,6 +44,10 @@ class GridGraph:
         """Return none."""
         return ()
 
+    def area_nodes(self, place: str) -> list[int]:  # noqa: ARG002 - a grid knows no areas
+        """Return none."""
+        return []
+
     def node_of(self, name: str) -> int | None:  # noqa: ARG002 - a grid knows no names
         """Return none."""
         return None

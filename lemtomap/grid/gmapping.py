@@ -15,9 +15,9 @@ from lemtomap.grid.beams import Beams
 from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.mapper import Tracker, roll_and_integrate
 from lemtomap.grid.matching import ScanMatch, refused
-from lemtomap.grid.motion import between, compose, odometry_drift
+from lemtomap.grid.motion import odometry_drift
 from lemtomap.grid.window import Window
-from lemtomap.se2 import Pose
+from lemtomap.se2 import Pose, between, compose
 
 
 @dataclass(frozen=True, slots=True)

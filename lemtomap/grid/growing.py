@@ -17,14 +17,13 @@ from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.gmapping import RollingGmapping, Visit
 from lemtomap.grid.kernels import window as kernels
 from lemtomap.grid.matching import ScanMatch
-from lemtomap.grid.motion import between, compose
 from lemtomap.grid.window import (
     LookUp,
     Scratch,
     Window,
     percent_table,
 )
-from lemtomap.se2 import Pose
+from lemtomap.se2 import Pose, between, compose
 from lemtomap.types import (
     GridView,
     Odometry,

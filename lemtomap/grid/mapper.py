@@ -16,15 +16,10 @@ from lemtomap.grid.config import SlamConfig
 from lemtomap.grid.foreground import without_foreground
 from lemtomap.grid.kernels import matching as matching_kernels
 from lemtomap.grid.matching import Matcher, ScanMatch, refused
-from lemtomap.grid.motion import (
-    OdometryNoise,
-    Uncertainty,
-    between,
-    compose,
-)
+from lemtomap.grid.motion import OdometryNoise, Uncertainty
 from lemtomap.grid.publish import SmoothCorrection
 from lemtomap.grid.window import Scratch, Window, look_up
-from lemtomap.se2 import Pose, wrap_angle
+from lemtomap.se2 import Pose, between, compose, wrap_angle
 from lemtomap.types import (
     GridView,
     Odometry,

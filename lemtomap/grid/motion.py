@@ -24,42 +24,6 @@ class Uncertainty:
     sigma_rad: float
 
 
-Numbers = tuple[float, float, float]
-"""One pose in plain numbers: x m, y m, yaw rad; products of several cost a third of what arrays do."""
-
-
-def numbers(T_a_b: Pose) -> Numbers:
-    """Return a single pose in plain numbers."""
-    x, y, yaw = T_a_b.tolist()
-    return x, y, yaw
-
-
-def product(T_a_b: Numbers, T_b_c: Numbers) -> Numbers:
-    """Return T_a_c."""
-    (x, y, yaw), (u, v, turn) = T_a_b, T_b_c
-    c, s = math.cos(yaw), math.sin(yaw)
-    total = (yaw + turn + math.pi) % (2.0 * math.pi) - math.pi
-    return x + c * u - s * v, y + s * u + c * v, total
-
-
-def quotient(T_w_a: Numbers, T_w_b: Numbers) -> Numbers:
-    """Return T_a_b."""
-    (x, y, yaw), (u, v, turn) = T_w_a, T_w_b
-    c, s = math.cos(yaw), math.sin(yaw)
-    total = (turn - yaw + math.pi) % (2.0 * math.pi) - math.pi
-    return c * (u - x) + s * (v - y), -s * (u - x) + c * (v - y), total
-
-
-def compose(T_a_b: Pose, T_b_c: Pose) -> Pose:
-    """Return T_a_c of two single poses; as se2.compose, for the path that every scan takes."""
-    return np.array(product(numbers(T_a_b), numbers(T_b_c)))
-
-
-def between(T_w_a: Pose, T_w_b: Pose) -> Pose:
-    """Return T_a_b of two single poses; as se2.between, for the path that every scan takes."""
-    return np.array(quotient(numbers(T_w_a), numbers(T_w_b)))
-
-
 def odometry_drift(step: Pose, config: SlamConfig) -> Uncertainty:
     """Return how far odometry drifts over a step, one standard deviation.
 

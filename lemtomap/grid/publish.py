@@ -5,15 +5,9 @@ import math
 import numpy as np
 
 from lemtomap.grid.config import SlamConfig
-from lemtomap.grid.motion import (
-    Numbers,
-    numbers,
-    product,
-    quotient,
-)
-from lemtomap.se2 import Pose
+from lemtomap.se2 import IDENTITY, Numbers, Pose, numbers, product, quotient
 
-_IDENTITY: Numbers = (0.0, 0.0, 0.0)
+_IDENTITY = numbers(IDENTITY)
 
 
 class SmoothCorrection:

@@ -11,7 +11,7 @@ import numpy as np
 
 from lemtomap.displacement import WatchConfig, pose_quality
 from lemtomap.errors import NotStarted
-from lemtomap.se2 import Pose
+from lemtomap.se2 import Pose, between
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.doubt import COVARIANCE_FLOOR, relative_to_window
 from lemtomap.topo.graph import Covariance, chain_covariance
@@ -74,7 +74,7 @@ class Localisation:
     @property
     def T_node_base(self) -> Pose:  # noqa: N802 - a frame's name
         """Where the robot is relative to the associated node."""
-        return kernels.pose_between(self._pose_of(self.associated_id), self.now.slam.T_grid_base)
+        return between(self._pose_of(self.associated_id), self.now.slam.T_grid_base)
 
     def distance_m(self, node_id: int) -> float:
         """Return how far a node of the neighbourhood is from the robot."""

@@ -37,6 +37,7 @@ from lemtomap.topo.recognition import (
     Situation,
 )
 from lemtomap.topo.repair import take_back
+from lemtomap.topo.segmentation import UNASSIGNED, Neighbourhood, Segmenter
 from lemtomap.topo.snapshots import Snapshots
 from lemtomap.topo.whole.trail import ScanTrail
 from lemtomap.types import (
@@ -62,6 +63,7 @@ class TopoMapper:
         *,
         level: int = 0,
         recogniser: Recogniser | None = None,
+        areas: Segmenter | None = None,
     ) -> None:
         """Go on with the store's map: in a new part of the graph, which a closure joins to the rest."""
         self.config = config
@@ -80,6 +82,9 @@ class TopoMapper:
         self._recogniser = recogniser
         if recogniser is not None:
             recogniser.attach(self.graph)
+        self._areas = areas
+        if areas is not None:
+            areas.attach(self.graph)
         self._news = News.NONE
         self._sure_m = 0.0
         self._neighbours = NeighbourFinder(config)
@@ -141,6 +146,8 @@ class TopoMapper:
                 self.local.release_forgotten(grid)
             self._associate_or_create()
         self._recognise()
+        if self._areas is not None:
+            self._areas.update(self._neighbourhood())
         standing = self.local.standings[self._at.associated_id]
         seen = standing.seen if standing.anchored else None
         self.trail.append(slam, self._at.associated_id, self.T_node_base, seen, points_base)
@@ -214,7 +221,10 @@ class TopoMapper:
 
     def _birth(self) -> int:
         before_id, stamp_s = self._at.associated_id, self._at.now.slam.stamp_s
-        area_id = self.graph.node(before_id).area_id if before_id else 1
+        if self._areas is not None:
+            area_id = UNASSIGNED
+        else:
+            area_id = self.graph.node(before_id).area_id if before_id else 1
         node_id = self.graph.add_node(area_id=area_id, level=self.level, created_s=stamp_s).node_id
         self._at.begin_at(node_id)
         self.keeper.due(node_id)
@@ -247,6 +257,19 @@ class TopoMapper:
                     self._anchor_found(found)
                 case NotFound():
                     self.found(known=False)
+
+    def _neighbourhood(self) -> Neighbourhood:
+        now = self._at.now
+        return Neighbourhood(
+            self._at.associated_id,
+            now.slam.T_grid_base,
+            self.travelled_m,
+            now.slam.stamp_s,
+            now.grid,
+            self.local.standings,
+            self.config.occupied_from,
+            self.level,
+        )
 
     def _situation(self) -> Situation:
         now, here_id, sure = self._at.now, self._at.associated_id, self.local.sure()

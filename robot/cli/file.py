@@ -12,7 +12,12 @@ MapFile = Annotated[Path, typer.Argument(metavar="MAP.lemto", help="the map file
 
 def register(app: typer.Typer) -> None:
     """Add this module's commands to the program, in the order of the help page."""
-    add(app, info, "lemtomap info office.lemto")
+    add(
+        app,
+        info,
+        "lemtomap info office.lemto",
+        "lemtomap info office.lemto --places                rooms, their doors and neighbours",
+    )
     add(
         app,
         edit,
@@ -21,6 +26,7 @@ def register(app: typer.Typer) -> None:
         "lemtomap edit office.lemto open kitchen 14",
         "lemtomap edit office.lemto delete-edge 3 97        a closure that is wrong",
         "lemtomap edit office.lemto level 31 -1",
+        "lemtomap edit office.lemto area name 7 'office 3'  also merge, split, kind, find",
         "lemtomap edit office.lemto undo",
         takes_minus=True,
     )
@@ -28,16 +34,21 @@ def register(app: typer.Typer) -> None:
         app,
         export,
         "lemtomap export office.lemto office.geojson        nav2 route server",
+        "lemtomap export office.lemto office.indoor.geojson areas and doors; .gml: IndoorGML",
         "lemtomap export office.lemto office.tmap2          topological_navigation",
         "lemtomap export office.lemto office.g2o            or .graphml, .png",
     )
 
 
-def info(map_file: MapFile) -> None:
+def info(
+    map_file: MapFile,
+    *,
+    places: Annotated[bool, typer.Option("--places", help="list areas, doors and named nodes")] = False,
+) -> None:
     """Show what a map holds."""
     from lemtomap.robot.cli import map_file as files
 
-    typer.echo(files.info(map_file))
+    typer.echo(files.info_places(map_file) if places else files.info(map_file))
 
 
 def edit(
@@ -45,7 +56,8 @@ def edit(
     words: Annotated[
         list[str],
         typer.Argument(
-            metavar="WHAT...", help="name, unname, delete, delete-edge, block, open, level, undo, history"
+            metavar="WHAT...",
+            help="name, unname, delete, delete-edge, block, open, level, area, undo, history",
         ),
     ],
 ) -> None:
@@ -57,7 +69,12 @@ def edit(
 
 def export(
     map_file: MapFile,
-    target: Annotated[Path, typer.Argument(metavar="FILE", help=".geojson, .tmap2, .g2o, .graphml or .png")],
+    target: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help=".geojson, .indoor.geojson, .gml, .tmap2, .g2o, .graphml or .png"
+        ),
+    ],
 ) -> None:
     """Write a map for another program; its suffix says which."""
     from lemtomap.robot.cli import map_file as files

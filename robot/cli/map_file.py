@@ -5,6 +5,10 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from lemtomap.areas import edit as areas
+from lemtomap.areas import export as area_export
+from lemtomap.areas.find import find_areas
+from lemtomap.areas.places import places
 from lemtomap.errors import BadSetting
 from lemtomap.topo.file import edit, journal
 from lemtomap.topo.file.info import MapInfo, describe_map
@@ -22,6 +26,12 @@ def info(path: Path) -> str:
     with TopoStore.view(path) as store:
         held = describe_map(store)
     return "\n".join(f"{name:<13} {value}" for name, value in _facts(held))
+
+
+def info_places(path: Path) -> str:
+    """Return what a person needs to find a room: areas, doors and nodes, a line each. Raises BadMap."""
+    with TopoStore.view(path) as store:
+        return "\n".join(places(store))
 
 
 def _facts(held: MapInfo) -> list[tuple[str, str]]:
@@ -49,7 +59,7 @@ def apply_edit(path: Path, words: Sequence[str]) -> str:
     if kind not in EDITS:
         raise BadSetting(f"edit '{shown(kind)}': must be one of {', '.join(EDITS)}")
     wanted, action = EDITS[kind]
-    if len(rest) != len(wanted):
+    if len(rest) != len(wanted) and not (action is _area and rest):
         raise BadSetting(f"edit {kind}: needs {' '.join(wanted) or 'nothing more'}")
     opened = TopoStore.view(path) if action is _history else TopoStore.editing(path)
     with opened as store:
@@ -112,6 +122,22 @@ def _level(store: TopoStore, words: Sequence[str]) -> str:
     return f"node {node_id} is on level {level}"
 
 
+def _area(store: TopoStore, words: Sequence[str]) -> str:
+    """Change areas: name, merge, split, kind or find."""
+    kind, rest = words[0], words[1:]
+    if kind not in AREA_EDITS:
+        raise BadSetting(f"edit area '{shown(kind)}': must be one of {', '.join(AREA_EDITS)}")
+    wanted, action = AREA_EDITS[kind]
+    if len(rest) != len(wanted):
+        raise BadSetting(f"edit area {kind}: needs {' '.join(wanted) or 'nothing more'}")
+    return action(store, rest)
+
+
+def _split(store: TopoStore, words: Sequence[str]) -> str:
+    a, b = (edit.resolve_node(store, word) for word in words[1:])
+    return areas.split_area(store, words[0], a, b, time.time())
+
+
 def _undo(store: TopoStore, _: Sequence[str]) -> str:
     what = journal.undo(store)
     return f"taken back: {shown(what, LINE)}" if what is not None else "nothing to take back"
@@ -121,6 +147,16 @@ def _history(store: TopoStore, _: Sequence[str]) -> str:
     return "\n".join(shown(entry.what, LINE) for entry in journal.entries(store)) or "no edits"
 
 
+AREA_EDITS: dict[str, tuple[tuple[str, ...], Edit]] = {
+    "name": (("AREA", "NAME"), lambda store, words: areas.name_area(store, words[0], words[1], time.time())),
+    "merge": (
+        ("AREA", "AREA"),
+        lambda store, words: areas.merge_areas(store, words[0], words[1], time.time()),
+    ),
+    "split": (("AREA", "NODE", "NODE"), _split),
+    "kind": (("AREA", "KIND"), lambda store, words: areas.set_kind(store, words[0], words[1], time.time())),
+    "find": ((), lambda store, _: find_areas(store, time.time())),
+}
 EDITS: dict[str, tuple[tuple[str, ...], Edit]] = {
     "name": (("NODE", "NAME"), _name),
     "unname": (("NAME",), _unname),
@@ -129,6 +165,7 @@ EDITS: dict[str, tuple[tuple[str, ...], Edit]] = {
     "block": (("NODE", "NODE"), _block),
     "open": (("NODE", "NODE"), _open),
     "level": (("NODE", "LEVEL"), _level),
+    "area": (("WHAT", "..."), _area),
     "undo": ((), _undo),
     "history": ((), _history),
 }
@@ -136,10 +173,10 @@ EDITS: dict[str, tuple[tuple[str, ...], Edit]] = {
 
 def export_map(path: Path, target: Path) -> str:
     """Write the map for another program, by the target's suffix. Raises BadMap, BadSetting."""
-    writer = EXPORTS.get(target.suffix.lower())
-    if writer is None:
+    kind = next((each for each in EXPORTS if target.name.lower().endswith(each)), "")
+    if not kind:
         raise BadSetting(f"{target}: unknown kind; known are {', '.join(EXPORTS)}")
-    kind = target.suffix.lower()
+    writer = EXPORTS[kind]
     with TopoStore.view(path) as store:
         writer(store, target)
         closed, unproven = export.left_out(store)
@@ -153,13 +190,18 @@ def export_map(path: Path, target: Path) -> str:
 
 def _write_png(store: TopoStore, target: Path) -> None:
     """Draw; matplotlib is loaded only when it is needed."""
+    from lemtomap.areas.painting import Painting
+    from lemtomap.areas.picture import paint
     from lemtomap.topo.whole.picture import write_png
 
-    write_png(store, target)
+    painting = Painting.of(store)
+    write_png(store, target, paint=lambda axes, places: paint(axes, painting, places, 16.0))
 
 
 EXPORTS: dict[str, Callable[[TopoStore, Path], None]] = {
-    ".geojson": export.write_geojson,
+    ".indoor.geojson": area_export.write_indoor,
+    ".geojson": area_export.write_route,
+    ".gml": area_export.write_indoorgml,
     ".tmap2": export.write_tmap2,
     ".g2o": export.write_g2o,
     ".graphml": export.write_graphml,
@@ -167,10 +209,15 @@ EXPORTS: dict[str, Callable[[TopoStore, Path], None]] = {
 }
 _PLACED = "its coordinates come from one full solve and are approximate"
 NOTES = {
+    ".indoor.geojson": f"areas and doors, Simple Indoor Tagging; {_PLACED}",
     ".geojson": f"nav2 route server; {_PLACED}",
+    ".gml": f"IndoorGML cells and states; {_PLACED}",
     ".tmap2": f"topological_navigation; {_PLACED}",
     ".g2o": f"pose graph, whose edges are measurements and not ways; {_PLACED}",
     ".graphml": "relative poses as the map holds them",
     ".png": f"a picture; {_PLACED}",
 }
-WITHOUT_CLOSED, WITHOUT_UNPROVEN = (".geojson", ".tmap2", ".g2o"), (".geojson", ".tmap2")
+WITHOUT_CLOSED, WITHOUT_UNPROVEN = (
+    (".indoor.geojson", ".geojson", ".gml", ".tmap2", ".g2o"),
+    (".indoor.geojson", ".geojson", ".gml", ".tmap2"),
+)

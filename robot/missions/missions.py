@@ -10,7 +10,7 @@ from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.navigator import Navigator
 from lemtomap.nav.types import Goal, NavOutput, NavState
 from lemtomap.robot.exchange import MissionState
-from lemtomap.robot.missions.nodes_by_distance import farthest_node, ways_from
+from lemtomap.robot.missions.nodes_by_distance import farthest_node, nearest_of, ways_from
 from lemtomap.robot.motion.docking import DockingOutput, DockingState
 from lemtomap.se2 import Pose
 from lemtomap.topo.events import LevelChanged, NavEvent
@@ -19,7 +19,11 @@ from lemtomap.types import MapView, RouteGraph
 
 
 class NamedGraph(RouteGraph, Protocol):
-    """A route graph whose nodes may bear names."""
+    """A route graph whose nodes and areas may bear names."""
+
+    def area_nodes(self, place: str) -> list[int]:
+        """Return the nodes of the area that `area:N` or a name means; empty: there is none."""
+        ...
 
     def node_of(self, name: str) -> int | None:
         """Return the node that bears this name."""
@@ -73,7 +77,9 @@ class Idle:
 
 
 class GoTo:
-    """Drive to one place: a node's number, its name, `start` (where the robot was first) or `far`."""
+    """Drive to one place: a node's number, its name, an area (`area:7` or its name), `start` (where the robot
+    was first) or `far`.
+    """
 
     def __init__(self, place: str) -> None:
         self.place = place
@@ -215,13 +221,23 @@ class Series:
 
 
 def resolve(place: str, moment: MissionInput) -> int | None:
-    """Return the node meant by a number, a name, `here`, `start` or `far`; None when there is none."""
+    """Return the node meant by a number, a name, `here`, `start` or `far`; None when there is none.
+
+    Of an area it is the node to which the way is shortest (thesis, section 3-5).
+    """
     node_id = number(place)
     if node_id is not None and moment.graph.has_node(node_id):
         return node_id
     named = moment.graph.node_of(place)
     if named is not None:
         return named
+    inside = frozenset(moment.graph.area_nodes(place))
+    if inside:
+        return nearest_of(moment.graph, moment.view.associated_id, inside, moment.now_s)
+    return _resolve_word(place, moment)
+
+
+def _resolve_word(place: str, moment: MissionInput) -> int | None:
     if place == "here":
         return moment.view.associated_id
     if place == "start":

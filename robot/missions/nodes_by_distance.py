@@ -2,6 +2,7 @@
 
 import heapq
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 
 from lemtomap.types import RouteGraph
 
@@ -19,6 +20,24 @@ def ways_from(graph: RouteGraph, start_id: int, at_most: int = 100_000) -> Itera
         for edge in graph.edges_of(node_id):
             if edge.other_id not in done:
                 heapq.heappush(heap, (length_m + edge.length_m, edge.other_id))
+
+
+def nearest_of(graph: RouteGraph, start_id: int, node_ids: AbstractSet[int], now_s: float) -> int:
+    """Return which of some nodes is reached soonest, over open ways if there are any."""
+    done: set[int] = set()
+    heap = [(0.0, 0.0, start_id)]
+    while heap:
+        closed, time_s, node_id = heapq.heappop(heap)
+        if node_id in node_ids:
+            return node_id
+        if node_id in done:
+            continue
+        done.add(node_id)
+        for edge in graph.edges_of(node_id):
+            if edge.other_id not in done:
+                barred = float(edge.blocked_until_s > now_s)  # a way through what is closed comes last
+                heapq.heappush(heap, (closed + barred, time_s + edge.time_s, edge.other_id))
+    return min(node_ids)
 
 
 def farthest_node(graph: RouteGraph, start_id: int) -> int:

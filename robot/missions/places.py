@@ -1,13 +1,14 @@
 """Whether the places that a mission names are in the map: asked before anything is opened or moves."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from pathlib import Path
 
+from lemtomap.areas.book import AreaBook
 from lemtomap.errors import BadSetting
 from lemtomap.topo import naming
 from lemtomap.topo.file.store import TopoStore
 
-GOTO = "goto:"
+GOTO, AREA = "goto:", "area:"
 ALWAYS_THERE = ("here", "start", "far")
 MAKES_NODES = ("explore", "tour")  # missions on which the map may grow
 
@@ -22,7 +23,9 @@ def check_places(mission: str, map_path: Path | None) -> None:
         _check(mission, "a new map", {}, lambda _: False)
         return
     with TopoStore.view(map_path) as store:
-        _check(mission, str(map_path), store.names(), lambda node_id: store.node(node_id) is not None)
+        names = store.names() | AreaBook(store).names()
+        areas = {f"{AREA}{area}": area for area in AreaBook(store).numbers()}
+        _check(mission, str(map_path), names, lambda node_id: store.node(node_id) is not None, areas)
 
 
 def mission_from(mission: str, map_path: Path | None) -> str:
@@ -30,11 +33,18 @@ def mission_from(mission: str, map_path: Path | None) -> str:
     return f"explore,{mission}" if mission.startswith(GOTO) and map_path is None else mission
 
 
-def _check(mission: str, where: str, names: Mapping[str, int], has_node: Callable[[int], bool]) -> None:
+def _check(
+    mission: str,
+    where: str,
+    names: Mapping[str, int],
+    has_node: Callable[[int], bool],
+    areas: Container[str] = (),
+) -> None:
     for place, explored in _places(mission):
-        number = naming.number(place)
+        number = naming.number(place.removeprefix(AREA))
         will_be_there = place in ALWAYS_THERE or (explored and number is not None)
-        if not will_be_there and place not in names and (number is None or not has_node(number)):
+        is_node = number is not None and not place.startswith(AREA) and has_node(number)
+        if not (will_be_there or is_node or place in names or place in areas):
             instead = naming.told_instead(place, names)
             raise BadSetting(f"{where}: there is no place '{naming.shown(place)}' ({instead})")
 

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap import se2
+from lemtomap.areas.painting import Painting
 from lemtomap.robot.child import python
 from lemtomap.robot.output.files import write_whole
 from lemtomap.se2 import Pose
 from lemtomap.types import EdgeType, GridView
 
-PAINT_LIMIT_S = 60.0
+PAINT_LIMIT_S = 60.0  # a picture takes a second or two
 
 
 class WallSketch:
@@ -62,6 +63,8 @@ class Overview:
     grid: GridView
     T_map_grid: Pose
     names: Mapping[int, str] = field(default_factory=dict)
+    painting: Painting | None = None
+    """Areas and doors; None: they are not known."""
     title: str = ""
     facts: Sequence[str] = ()
 

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from lemtomap import se2
+from lemtomap.areas.picture import paint as paint_areas
 from lemtomap.robot.output.files import grey_levels
 from lemtomap.robot.output.overview import Overview
 from lemtomap.se2 import Pose
@@ -110,6 +111,8 @@ def _draw_graph(axes: Axes, overview: Overview) -> None:
         nodes = np.array([pose[:2] for pose in overview.T_map_node.values()])
         size = float(np.clip(4000 / len(nodes), 3, 18))
         axes.scatter(nodes[:, 0], nodes[:, 1], s=size, color=NODE_COLOUR, zorder=7, linewidths=0)
+    if overview.painting is not None and overview.T_map_node:
+        paint_areas(axes, overview.painting, overview.T_map_node, size)
     for node_id, name in overview.names.items():
         if node_id in overview.T_map_node:
             write_name(axes, name, overview.T_map_node[node_id], xytext=(4, 4), fontsize=9, zorder=9)

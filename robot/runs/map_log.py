@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.areas.painting import Painting
 from lemtomap.errors import BadSetting
 from lemtomap.grid import (
     DEFAULT_SLAM,
@@ -138,7 +139,7 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
             with first_use(bar):
                 drive = _drive(log, Mapper(lambda: slam, topo, watched=False), slam, bar)
             final = map_on_path(topo, grid.path()) if isinstance(grid, GrowingGmapping) else final_map(topo)
-            view = topo.view()
+            view, painting = topo.view(), Painting.of(store)
         finally:
             topo.close()
         summary = _summary(options, drive, final)
@@ -147,7 +148,7 @@ def map_log(options: MapLogOptions, bar: Bar) -> str:
         summary["map_bytes"] = outputs.file_bytes(stage / "map.lemto")
         outputs.write_trajectory(stage / "trajectory.tum", final.stamps_s, final.T_map_base)
         outputs.write_grid(stage, view.grid, final.T_map_grid)
-        draw(stage / "overview.png", _overview(options, summary, drive, final, view))
+        draw(stage / "overview.png", _overview(options, summary, drive, final, view, painting))
         summary |= {
             "wall_s": time.perf_counter() - begun_s,
             "cpu_s": time.process_time() - begun_cpu_s,
@@ -214,7 +215,12 @@ def _summary(options: MapLogOptions, drive: _Drive, final: FinalMap) -> dict[str
 
 
 def _overview(
-    options: MapLogOptions, summary: dict[str, Any], drive: _Drive, final: FinalMap, view: MapView
+    options: MapLogOptions,
+    summary: dict[str, Any],
+    drive: _Drive,
+    final: FinalMap,
+    view: MapView,
+    painting: Painting,
 ) -> Overview:
     """Gather what the picture shows."""
     took = f" in {summary['log_s'] / 60:.0f} min" if "log_s" in summary else ""
@@ -236,6 +242,7 @@ def _overview(
         grid=view.grid,
         T_map_grid=final.T_map_grid,
         names=view.names,
+        painting=painting,
         title=options.log.name,
         facts=facts,
     )

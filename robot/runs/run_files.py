@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.areas.painting import Painting
 from lemtomap.robot.core import Effort, RobotCore
 from lemtomap.robot.devices.parts import DEFAULT_LIMIT, PartFiles
 from lemtomap.robot.devices.recording import Recorder
@@ -240,6 +241,7 @@ class RunFiles(Onlooker):
             grid=view.grid,
             T_map_grid=final.T_map_grid,
             names=view.names,
+            painting=Painting.of(self._core.mapping.mapper.topo.store),
             title=self._title,
             facts=_facts(summary),
         )

@@ -39,7 +39,7 @@ from lemtomap.robot.output.onlooker import LOOK_PERIOD_S, Onlooker
 from lemtomap.robot.runs.interrupts import on_interrupt
 
 OUTPUT_PERIOD_S = 0.02  # design, section 4
-SHORTEST_NAP_S = 0.001
+SHORTEST_NAP_S = 0.001  # a busy machine gives no shorter one
 LONGEST_NAP_S = 0.025  # a packet comes every 20 ms, now and then a little later
 SETTLE_S = 1.0  # after a mission: the last scans, a standing robot
 JOIN_S = 5.0

@@ -33,6 +33,7 @@ def test_compose_is_associative(a, b, c):
 def test_one_pose_and_a_row_of_poses_give_the_same(T_a_b, T_b_c):
     assert close(se2.compose(T_a_b[None], T_b_c)[0], se2.compose(T_a_b, T_b_c))
     assert close(se2.inverse(T_a_b[None])[0], se2.inverse(T_a_b))
+    assert close(se2.between(T_a_b[None], T_b_c)[0], se2.between(T_a_b, T_b_c), 1e-7)
 
 
 @given(poses, poses, metres, metres)

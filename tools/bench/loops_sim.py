@@ -1,6 +1,7 @@
 """Closures, cold starts, kidnaps and changed buildings in simulation, judged by truth.
 
     lemtomap bench loops_sim closures [--seeds 10] [--willow willow.yaml]   wrong closures, revisits closed
+    lemtomap bench loops_sim atria    [--seeds 50]                          driven round halls, 4 starts each
     lemtomap bench loops_sim cold     [--world office] [--starts 50]        switched on anywhere in a map
     lemtomap bench loops_sim elsewhere [--world offices:24] [--starts 50]   ... where only a part is mapped
     lemtomap bench loops_sim kidnap   [--world office] [--starts 50]        carried or pushed somewhere else
@@ -16,10 +17,12 @@ import argparse
 import json
 import sqlite3
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +32,7 @@ from lemtomap.sim.tours import plan_tour
 from lemtomap.sim.world import World
 from lemtomap.topo.loops.descriptor import BYTES
 from lemtomap.topo.loops.index import PlaceIndex
+from tools.bench.parts import atria as halls
 from tools.bench.parts.mapping_runs import table
 from tools.bench.parts.sim_buildings import building, next_day
 from tools.bench.parts.sim_maps import BINS, JudgedMap, still_true
@@ -40,6 +44,7 @@ from tools.bench.parts.sim_trials import (
     Found,
     Trial,
 )
+from tools.bench.slam_parts import sparse
 
 CLOSURE_WORLDS = {"office@3": 600.0, "loop": 420.0, "alike:16": 420.0, "offices:24": 600.0}  # seconds of tour
 WILLOW_S, WILLOW_LARGE_S = 600.0, 1200.0
@@ -135,6 +140,32 @@ def _closure_row(found: Sequence[Found]) -> list[str]:
         share,
         f"{cpu_s:.0f}",
     ]
+
+
+def atria(options: argparse.Namespace) -> None:
+    """Drive round atria, triangles and halls, and count what a person would have closed at once."""
+    found: dict[str, list[Found]] = {}
+    for wheels in sparse.WHEELS:
+        for seed, start in product(range(options.seeds), range(halls.STARTS)):
+            name = f"{halls.KINDS[seed % len(halls.KINDS)]}, {wheels}"
+            case = options.out / f"atria-{wheels.replace(' ', '_')}-{seed}-{start}"
+            told = _kept(case, partial(_driven_round, seed, start, wheels))
+            found.setdefault(name, []).append(told)
+            print(f"{name}, {seed} from {start}: {told}", flush=True)
+    rows = []
+    for name, each in [*found.items(), ("all", [told for many in found.values() for told in many])]:
+        total = {key: sum(told[key] for told in each) for key in ("closures", "wrong", "closed", "missed")}
+        share = f"{total['closed'] / max(1, total['closed'] + total['missed']):.1%}"
+        worst_m = f"{max(told['worst_m'] for told in each):.2f}"
+        rows.append([name, str(len(each)), str(total["closures"]), str(total["wrong"]), worst_m, share])
+    print(table(["floor", "drives", "closures", "wrong", "worst m", "closed in 5 m"], rows))
+
+
+def _driven_round(seed: int, start: int, wheels: str) -> Found:
+    with tempfile.TemporaryDirectory() as folder:
+        driven = halls.drive(seed, start, Path(folder), wheels)
+    closures = {"closures": driven.closures, "wrong": driven.wrong, "worst_m": round(driven.worst_m, 3)}
+    return closures | {"closed": driven.revisits.closed, "missed": driven.revisits.missed}
 
 
 # -- finding itself
@@ -314,6 +345,7 @@ def _key(name: str) -> str:
 
 PARTS: dict[str, Callable[[argparse.Namespace], None]] = {
     "closures": closures,
+    "atria": atria,
     "cold": cold,
     "elsewhere": elsewhere,
     "kidnap": kidnap,

@@ -35,6 +35,7 @@ from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.mapper import TopoMapper
 from lemtomap.types import EdgeType
+from tools.truth.walls import wall_between
 
 RIGHT_WITHIN_M = 0.3  # association has a margin: a node this little further than the nearest is right too
 
@@ -117,7 +118,7 @@ def _judge(found: Findings, mapper: TopoMapper, at: Pose, born: dict[int, Pose],
     away = np.array([T[:2] for T in born.values()]) - at[:2]
     within_m = float(np.hypot(*(born[node_id][:2] - at[:2]))) - RIGHT_WITHIN_M
     nearer = [T for T, gap_m in zip(born.values(), np.hypot(*away.T), strict=True) if gap_m < within_m]
-    found.right.append(all(crosses(raster, at, T) for T in nearer))
+    found.right.append(all(wall_between(raster, at, T) for T in nearer))
 
 
 def _seen(mapper: TopoMapper, node_id: int) -> Pose:
@@ -137,15 +138,7 @@ def _detour(mapper: TopoMapper, born: dict[int, Pose], world: World) -> float:
 
 def _walls_crossed(mapper: TopoMapper, born: dict[int, Pose], raster: Raster) -> tuple[int, int]:
     near = [edge for edge in mapper.store.edges() if edge.type is EdgeType.NEAR_NEIGHBOUR]
-    return len(near), sum(crosses(raster, born[edge.source_id], born[edge.target_id]) for edge in near)
-
-
-def crosses(raster: Raster, a: Pose, b: Pose) -> bool:
-    """Return True if a wall of the true plan lies on the straight line between two places."""
-    steps = max(2, int(np.hypot(*(b[:2] - a[:2])) / (0.4 * raster.resolution_m)))
-    points = a[:2] + np.linspace(0.0, 1.0, steps)[:, None] * (b[:2] - a[:2])
-    cols, rows = np.floor((points - np.array(raster.origin_m)) / raster.resolution_m).astype(int).T
-    return bool(raster.occupied[rows, cols].any())
+    return len(near), sum(wall_between(raster, born[edge.source_id], born[edge.target_id]) for edge in near)
 
 
 def report(found: list[Findings]) -> None:

@@ -7,8 +7,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lemtomap.kernels.lines import first_on_line
 from lemtomap.nav.kernels import explore as kernels
-from lemtomap.nav.motion.metric import Reach
+from lemtomap.nav.kernels import fields
+from lemtomap.nav.motion.metric import Reach, top_cost
 from lemtomap.se2 import Pose
 
 NEAR_CELLS = 5
@@ -63,20 +65,39 @@ class Ground:
 
     def walled_off(self, p_grid: ArrayLike, q_grid: ArrayLike) -> bool:
         """Return True if an obstacle stands between two places."""
-        return self._worst(p_grid, q_grid) == kernels.LETHAL
+        return self._holds_on_line(p_grid, q_grid, kernels.LETHAL)
 
     def node_in_sight(self, p_grid: ArrayLike, T_grid_node: Mapping[int, Pose], otherwise_id: int) -> int:
-        """Return the nearest node from which a place is seen over known floor, else the one given.
+        """Return the nearest node from which the robot gets straight to a place over known floor.
 
-        The nearest of all may stand in the next room.
+        The nearest of all may stand in the next room, or see it through a rack that no robot fits through.
+        Where none has a straight way it is the node with the shortest one, and without any the one given.
         """
         p = np.asarray(p_grid, dtype=np.float64)[:2]
         away = {node_id: float(np.hypot(*(T[:2] - p))) for node_id, T in T_grid_node.items()}
+        costs, ends = self.reach.costs, UP_TO_M / self.reach.costs.resolution_m
         for node_id in sorted(away, key=lambda n: away[n]):
-            if self._worst(p, T_grid_node[node_id]) == kernels.FREE:
+            line = (*costs.cell(T_grid_node[node_id]), *costs.cell(p))
+            if kernels.fits_between(costs.cost, costs.state, *line, ends):
                 return node_id
+        way = self._ways_to(p, T_grid_node)
+        if way:
+            return min(way, key=lambda n: way[n])
         return otherwise_id if otherwise_id in away else min(away, key=lambda n: away[n])
 
-    def _worst(self, p_grid: ArrayLike, q_grid: ArrayLike) -> int:
+    def _ways_to(self, p_grid: NDArray[np.float64], T_grid_node: Mapping[int, Pose]) -> dict[int, float]:
+        """Return the cost (cells) of the way over known floor from each node that has one."""
+        costs, near = self.reach.costs, self.reach.nearest(p_grid, UP_TO_M)
+        if near is None:
+            return {}
+        seed = np.array([near[0] * costs.state.shape[1] + near[1]], dtype=np.int64)
+        field = fields.march(costs.cost, seed, np.zeros(1), -1, 0.0, top_cost(costs))
+        cells = {node_id: self.reach.nearest(T, UP_TO_M) for node_id, T in T_grid_node.items()}
+        ways = {node_id: float(field[cell[0], cell[1]]) for node_id, cell in cells.items() if cell}
+        return {node_id: way for node_id, way in ways.items() if np.isfinite(way)}
+
+    def _holds_on_line(self, p_grid: ArrayLike, q_grid: ArrayLike, least: int) -> bool:
+        """Return True if a state that bad lies between two places; beyond the window all is unknown."""
         costs = self.reach.costs
-        return int(kernels.worst_between(costs.state, *costs.cell(p_grid), *costs.cell(q_grid)))
+        line = (*costs.cell(p_grid), *costs.cell(q_grid))
+        return bool(np.isfinite(first_on_line(costs.state, *line, least, kernels.UNKNOWN)))

@@ -4,6 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from lemtomap.kernels.lines import first_on_line
+
 F4 = NDArray[np.float32]
 I4 = NDArray[np.int32]
 U1 = NDArray[np.uint8]
@@ -111,18 +113,24 @@ def frontier_cells(reach: U1, state: U1, leads: U1) -> U1:
 
 
 @njit(nogil=True, cache=True)
-def worst_between(state: U1, row0: float, col0: float, row1: float, col1: float) -> int:
-    """Return the worst state on a straight line; what lies outside the window is UNKNOWN."""
+def fits_between(
+    cost: F4, state: U1, row0: float, col0: float, row1: float, col1: float, ends: float
+) -> bool:
+    """Return True if the body fits all along a straight line over known floor.
+
+    Within `ends` (cells) of either end the floor need only be known: both may stand close to a wall.
+    """
     height, width = state.shape
-    steps = int(2.0 * max(abs(row1 - row0), abs(col1 - col0))) + 1
-    worst = FREE
+    length = max(abs(row1 - row0), abs(col1 - col0))
+    steps = int(2.0 * length) + 1
     for k in range(steps + 1):
         r, c = int(row0 + (row1 - row0) * k / steps), int(col0 + (col1 - col0) * k / steps)
-        here = state[r, c] if 0 <= r < height and 0 <= c < width else UNKNOWN
-        if here == LETHAL:
-            return LETHAL
-        worst = max(worst, here)
-    return worst
+        if r < 0 or c < 0 or r >= height or c >= width or state[r, c] != FREE:
+            return False
+        from_end = length * min(k, steps - k) / steps
+        if from_end > ends and not np.isfinite(cost[r, c]):
+            return False
+    return True
 
 
 @njit(nogil=True, cache=True)
@@ -146,7 +154,8 @@ def dark_in_sight(state: U1, large: U1, row: float, col: float, radius: float) -
         for c in range(c0, c1):
             if not large[r, c] or (r - here_r) ** 2 + (c - here_c) ** 2 > radius * radius:
                 continue
-            if worst_between(state, here_r + 0.5, here_c + 0.5, r + 0.5, c + 0.5) != LETHAL:
+            line = (here_r + 0.5, here_c + 0.5, r + 0.5, c + 0.5)
+            if np.isinf(first_on_line(state, *line, LETHAL, UNKNOWN)):
                 return True
     return False
 
@@ -163,7 +172,7 @@ def barely_shown(state: U1, large: U1, row: float, col: float, radius: float) ->
         for c in range(max(0, int(col - radius)), min(width, int(col + radius) + 2)):
             if (r + 0.5 - row) ** 2 + (c + 0.5 - col) ** 2 > radius * radius:
                 continue
-            if worst_between(state, row, col, r + 0.5, c + 0.5) == LETHAL:
+            if np.isfinite(first_on_line(state, row, col, r + 0.5, c + 0.5, LETHAL, UNKNOWN)):
                 continue
             if large[r, c]:
                 dark = True

@@ -392,22 +392,3 @@ def descend(field: F4, row: float, col: float, step: float, max_steps: int) -> F
         path[count, 0], path[count, 1] = row, col
         count += 1
     return path[:count]
-
-
-@njit(nogil=True, cache=True)
-def worst_on_line(cost: F4, state: U1, row0: float, col0: float, row1: float, col1: float) -> int:
-    """Return the worst on a straight line: 0 seen floor all along, 1 unseen floor, 2 body does not fit."""
-    height, width = cost.shape
-    dr, dc = row1 - row0, col1 - col0
-    steps = int(np.ceil(2.0 * max(abs(dr), abs(dc)))) + 1
-    worst = 0
-    for k in range(steps + 1):
-        r = int(np.floor(row0 + dr * k / steps))
-        c = int(np.floor(col0 + dc * k / steps))
-        if r < 0 or c < 0 or r >= height or c >= width:
-            return 2
-        if np.isinf(cost[r, c]):
-            return 2
-        if state[r, c] == UNKNOWN:
-            worst = 1
-    return worst

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lemtomap import se2
+from lemtomap.kernels.lines import first_on_line
 from lemtomap.nav.config import BodyLimits, CostmapConfig
 from lemtomap.nav.kernels import fields as kernels
 from lemtomap.nav.kernels import shapes
@@ -42,6 +43,11 @@ class Costs:
         margin = margin_m / self.resolution_m
         rows, cols = self.state.shape
         return bool(margin <= row < rows - margin and margin <= col < cols - margin)
+
+    def fits_between(self, p_grid: ArrayLike, q_grid: ArrayLike) -> bool:
+        """Return True if the body fits all along the straight line between two places in the window."""
+        line = (*self.cell(p_grid), *self.cell(q_grid))
+        return bool(np.isinf(first_on_line(self.cost, *line, np.inf, np.inf)))
 
     def to_grid(self, rows_cols: NDArray[np.float64]) -> Points:
         """Return points (N, 2) in the grid frame of [row, col] pairs (N, 2)."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lemtomap.kernels.lines import first_on_line
 from lemtomap.nav.kernels import fields as kernels
 from lemtomap.nav.motion.costmap import Costs
 from lemtomap.nav.motion.metric import Reach, reach_from
@@ -74,13 +75,11 @@ def _is_filled(costs: Costs, p_a_grid: Pose, p_b_grid: Pose) -> bool:
 def cut_at(costs: Costs, p_a_grid: ArrayLike, p_b_grid: ArrayLike) -> tuple[float, float] | None:
     """Return where on the line from a to b, both in the window, the first obstacle stands, metres."""
     (row0, col0), (row1, col1) = costs.cell(p_a_grid), costs.cell(p_b_grid)
-    share = np.linspace(0.0, 1.0, int(2.0 * max(abs(row1 - row0), abs(col1 - col0))) + 2)
-    line = np.stack([row0 + (row1 - row0) * share, col0 + (col1 - col0) * share], axis=-1)
-    rows, cols = np.clip(np.floor(line).astype(int), 0, np.array(costs.state.shape) - 1).T
-    solid = np.flatnonzero(costs.state[rows, cols] == kernels.LETHAL)
-    if not solid.size:
+    share = first_on_line(costs.state, row0, col0, row1, col1, kernels.LETHAL, kernels.UNKNOWN)
+    if math.isinf(share):
         return None
-    x, y = costs.to_grid(line[solid[:1]])[0]
+    stands = np.array([[row0 + (row1 - row0) * share, col0 + (col1 - col0) * share]])
+    x, y = costs.to_grid(stands)[0]
     return float(x), float(y)
 
 
@@ -101,7 +100,7 @@ def find_detour(
         near, far = (T_grid_node.get(route.nodes[end]) for end in (index, index + 1))
         if near is None or far is None or not (costs.holds(near) and costs.holds(far)):
             continue
-        if kernels.worst_on_line(costs.cost, costs.state, *costs.cell(near), *costs.cell(far)) == 2:
+        if not costs.fits_between(near, far):
             return _barrier(route, index, near, far, costs)
     return None
 

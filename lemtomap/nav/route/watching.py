@@ -6,6 +6,7 @@ from collections.abc import Container
 
 import numpy as np
 
+from lemtomap.kernels.lines import first_on_line
 from lemtomap.nav.config import RecoveryConfig
 from lemtomap.nav.kernels import fields as kernels
 from lemtomap.nav.motion.metric import Reach
@@ -153,7 +154,8 @@ def links_open_again(closed: Container[int], map_view: MapView, reach: Reach) ->
     for edge_id, a, b, _ in map_view.edges:
         if edge_id not in closed or a not in places or b not in places:
             continue
-        start, end = costs.cell(places[a]), costs.cell(places[b])
-        if kernels.worst_on_line(costs.cost, costs.state, *start, *end) == 0:
+        line = (*costs.cell(places[a]), *costs.cell(places[b]))
+        seen = math.isinf(first_on_line(costs.state, *line, kernels.UNKNOWN, kernels.UNKNOWN))
+        if seen and costs.fits_between(places[a], places[b]):
             opened.append((edge_id, a, b))
     return opened

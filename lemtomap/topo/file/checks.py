@@ -75,6 +75,7 @@ OTHER_NODE = Kind(f"{NODE.sql} AND {{0}} != source", "no other node of this map"
 METRES = _real(-MOST_LENGTH_M, MOST_LENGTH_M)
 STAMP = _real(-FOR_EVER_S, FOR_EVER_S)
 TEXT = Kind(f"typeof({{0}}) = 'text' AND length({{0}}) <= {MOST_TEXT}", f"no text of at most {MOST_TEXT}")
+JSON = Kind(f"{TEXT.sql} AND json_valid({{0}})", "no JSON text")
 BLOB = _blob(MOST_BLOB_BYTES)
 BOUNDARY = Kind(
     f"{BLOB.sql} AND substr({{0}}, 1, 1) = X'{PLACE_FORMAT:02X}' "
@@ -82,8 +83,8 @@ BOUNDARY = Kind(
     "localisation data of an unknown format",
 )
 META = Kind(
-    "CASE WHEN key IN ('next_node', 'next_edge', 'pruned_to') THEN typeof({0}) = 'integer' "
-    "AND {0} >= 0 WHEN key = 'stamp_s' THEN typeof({0}) IN ('real', 'integer') "
+    "CASE WHEN key IN ('next_node', 'next_edge', 'next_area', 'next_door', 'pruned_to') "
+    "THEN typeof({0}) = 'integer' AND {0} >= 0 WHEN key = 'stamp_s' THEN typeof({0}) IN ('real', 'integer') "
     f"ELSE {{0}} IS NULL OR length({{0}}) <= {MOST_BLOB_BYTES} END",
     "no number, or too long",
 )
@@ -112,7 +113,22 @@ COLUMNS: dict[str, dict[str, Kind]] = {
     },
     "meta": {"key": TEXT, "value": META},
     "name": {"name": TEXT, "node": NODE},
-    "area": {"id": ID, "name": _or_none(TEXT), "kind": _or_none(TEXT), "tags": _or_none(TEXT)},
+    "area": {"id": ID, "name": _or_none(TEXT), "kind": _or_none(TEXT), "tags": _or_none(JSON)},
+    "door": {
+        "id": ID,
+        "node": COUNT,  # whose node may have gone since
+        "x": METRES,
+        "y": METRES,
+        "yaw": _real(-MOST_YAW_RAD, MOST_YAW_RAD),
+        "width": _real(0.0, MOST_LENGTH_M),
+        "seen_open": COUNT,
+        "seen_shut": COUNT,
+        "last_open": _or_none(STAMP),
+        "last_shut": _or_none(STAMP),
+        "passed": COUNT,
+        "is_door": _whole(0, 1),
+    },
+    "door_edge": {"edge": ID, "door": ID},
     "placeholder": {
         "id": COUNT,
         "node": COUNT,  # whose node may have gone since

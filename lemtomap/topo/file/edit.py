@@ -42,6 +42,8 @@ def name_node(store: TopoStore, node_id: int, name: str, stamp_s: float = 0.0) -
     fault = naming.fault(name)
     if fault is not None:
         raise BadInput(f"'{naming.shown(name)}' cannot be a name: {fault}")
+    for (area_id,) in store.query("SELECT id FROM area WHERE name = ?", (name,)):
+        raise BadInput(f"{store.path}: '{naming.shown(name)}' is the name of area {area_id} already")
     owner = store.names().get(name, node_id)
     moved = f", until then node {owner}" if owner != node_id else ""
     with recorded(store, f"name node {node_id} '{name}'{moved}", stamp_s) as recording:
@@ -72,8 +74,10 @@ def delete_node(store: TopoStore, node_id: int, stamp_s: float = 0.0) -> None:
         recording.touch("place", node_id)
         for end in ("source", "target"):
             recording.touch_where("edge", end, node_id)
-        for table in ("name", "placeholder", "ground", "mark"):
+        for table in ("name", "placeholder", "ground", "mark", "door"):
             recording.touch_where(table, "node", node_id)
+        for edge in store.edges_of(node_id):
+            recording.touch("door_edge", edge.edge_id)
         store.delete_node(node_id)
 
 
@@ -82,6 +86,7 @@ def delete_edge(store: TopoStore, edge_id: int, stamp_s: float = 0.0) -> None:
     edge = _edge(store, edge_id)
     with recorded(store, f"delete {edge.type} edge {edge_id}", stamp_s) as recording:
         recording.touch("edge", edge_id)
+        recording.touch("door_edge", edge_id)
         store.delete_edge(edge_id)
 
 
@@ -118,6 +123,7 @@ def set_level(store: TopoStore, node_id: int, level: int, stamp_s: float = 0.0) 
         store.put_node(replace(node, level=level))
         for edge in _wrong_levels(store, node_id, level):
             recording.touch("edge", edge.edge_id)
+            recording.touch("door_edge", edge.edge_id)
             store.delete_edge(edge.edge_id)
 
 

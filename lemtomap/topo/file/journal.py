@@ -22,6 +22,8 @@ KEYS = {
     "edge": "id",
     "name": "name",
     "area": "id",
+    "door": "id",
+    "door_edge": "edge",
     "placeholder": "id",
     "ground": "node",
     "mark": "id",
@@ -55,6 +57,15 @@ class RowsBefore:
         sql = f"SELECT {KEYS[table]} FROM {table} WHERE {column} = ?"  # noqa: S608 - names from this program
         for (key,) in list(self._store.query(sql, (value,))):
             self.touch(table, key)
+
+    def touch_all(self, table: str) -> None:
+        """Write down all rows of a table."""
+        for (key,) in list(self._store.query(f"SELECT {KEYS[table]} FROM {table}")):  # noqa: S608
+            self.touch(table, key)
+
+    def touch_new(self, table: str, key: float | str) -> None:
+        """Note a row that this edit itself has made, unless it was there before."""
+        self._before.setdefault((table, key), None)
 
     def text(self) -> str:
         """Return what was written down, as JSON."""

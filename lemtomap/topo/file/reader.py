@@ -21,6 +21,7 @@ from lemtomap.topo.graph import (
     Placeholder,
     detour,
 )
+from lemtomap.topo.naming import LONGEST_NUMBER
 from lemtomap.types import EdgeTable, EdgeType, RouteEdge
 
 _NEIGHBOURS = (
@@ -30,6 +31,14 @@ _NEIGHBOURS = (
 _ALL_EDGES = "SELECT id, source, target, time, blocked, measure, type FROM edge"
 _EDGES_AT = _ALL_EDGES + " WHERE source = ?1 OR target = ?1"
 _DETOURS = np.array([detour(kind) for kind in sorted(EdgeType, key=type_code)])  # by the file's type code
+_AREA_OF_NAME = (
+    "SELECT id FROM area WHERE name = ?1 OR EXISTS "
+    "(SELECT 1 FROM json_each(area.tags, '$.names') WHERE value = ?1)"
+)
+_AREA_OF_NUMBER = (
+    "SELECT id FROM area WHERE id = ?1 OR EXISTS "
+    "(SELECT 1 FROM json_each(area.tags, '$.aliases') WHERE value = ?1)"
+)
 _CLOSURE = type_code(EdgeType.LOOP_CLOSING)
 _MEASURE = np.dtype(
     {"names": ["x", "y"], "formats": ["<f8", "<f8"], "offsets": [0, 8], "itemsize": MEASURE.size}
@@ -162,6 +171,19 @@ class TopoReader:
         """Return every name, and the node that bears it."""
         with schema.guarded(self.path):
             return dict(self._db.execute("SELECT name, node FROM name"))
+
+    def area_nodes(self, place: str) -> list[int]:
+        """Return the nodes of the area meant by `area:N` or a name, also of one that merged; empty: none."""
+        number = place.removeprefix("area:")
+        if number != place and not (number.isdecimal() and len(number) <= LONGEST_NUMBER):
+            return []
+        with schema.guarded(self.path):
+            if number == place:
+                rows = self._db.execute(_AREA_OF_NAME, (place,)).fetchall()
+            else:
+                rows = self._db.execute(_AREA_OF_NUMBER, (int(number),)).fetchall()
+            found = [self._db.execute("SELECT id FROM node WHERE area = ?", row).fetchall() for row in rows]
+        return [node_id for nodes in found for (node_id,) in nodes]
 
     def close(self) -> None:
         """Close the connection; the file is untouched."""

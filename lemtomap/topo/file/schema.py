@@ -18,7 +18,9 @@ from lemtomap.errors import BadMap
 from lemtomap.topo.naming import shown
 
 APPLICATION_ID = 0x4C454D54  # "LEMT"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
+OLDEST_SCHEMA = 2
+"""Schema 2 is schema 3 without doors: such a map opens, and is of schema 3 from its first change on."""
 PAGE_SIZE = 1024  # a small map stays small: every table and index takes at least one page
 MOST_VALUE_BYTES = 16 << 20  # of one text or blob: the journal's largest are a hundredth of it
 LEAST_BYTES = 512  # of an SQLite file: its smallest page
@@ -32,6 +34,9 @@ TABLES = {
     "meta": "(key TEXT PRIMARY KEY, value) WITHOUT ROWID",
     "name": "(name TEXT PRIMARY KEY, node INT) WITHOUT ROWID",
     "area": "(id INTEGER PRIMARY KEY, name TEXT, kind TEXT, tags TEXT)",
+    "door": "(id INTEGER PRIMARY KEY, node INT, x REAL, y REAL, yaw REAL, width REAL, seen_open INT, "
+    "seen_shut INT, last_open REAL, last_shut REAL, passed INT, is_door INT)",
+    "door_edge": "(edge INTEGER PRIMARY KEY, door INT)",
     "placeholder": "(id INTEGER PRIMARY KEY, node INT, x REAL, y REAL, yaw REAL, width REAL, state TEXT)",
     "ground": "(node INTEGER PRIMARY KEY, picture BLOB)",
     "mark": "(id INTEGER PRIMARY KEY, node INT, kind TEXT, x REAL, y REAL, stamp REAL)",
@@ -43,6 +48,9 @@ INDEXES = {
     "edge_source": "edge(source)",
     "edge_target": "edge(target)",
     "edge_blocked": "edge(id) WHERE blocked IS NOT NULL",
+    "node_area": "node(area)",
+    "door_node": "door(node)",
+    "door_edge_door": "door_edge(door)",
 }
 DESCRIPTOR_BYTES = 20
 LOOK_UP_TABLES = {
@@ -69,6 +77,7 @@ def complete(connection: sqlite3.Connection) -> None:
         connection.execute(f"CREATE TABLE IF NOT EXISTS {name}{columns}")
     for name, what in INDEXES.items():
         connection.execute(f"CREATE INDEX IF NOT EXISTS {name} ON {what}")
+    connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
 
 
 def strip(connection: sqlite3.Connection) -> None:
@@ -133,8 +142,8 @@ def check_file(path: Path) -> None:
         raise BadMap(
             f"{path}: schema {version} is newer than this program's {SCHEMA_VERSION}; update LEMTOMap"
         )
-    if version < SCHEMA_VERSION:
-        raise BadMap(f"{path}: schema {version} is older than {SCHEMA_VERSION}, which this program reads")
+    if version < OLDEST_SCHEMA:
+        raise BadMap(f"{path}: schema {version} is older than {OLDEST_SCHEMA}, the oldest this program reads")
 
 
 def _refuse_stump(path: Path) -> None:

@@ -15,7 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from lemtomap.errors import BadMap
+from lemtomap.se2 import compose
 from lemtomap.topo.file import checks, schema
 from lemtomap.topo.file.rows import (
     EDGE_COLUMNS,
@@ -320,13 +323,28 @@ class TopoStore:
         )
 
     def delete_node(self, node_id: int) -> None:
-        """Remove a node with its edges, names and marks. Its ID stays used for ever."""
+        """Remove a node with its edges, names and marks; its doors move to a neighbour. Its ID stays used."""
+        self._rehome_doors(node_id)
         for edge in self.edges_of(node_id):
             self.delete_edge(edge.edge_id)
         for table in ("name", "place", "placeholder", "ground", "mark"):
             self._write(f"DELETE FROM {table} WHERE node = ?", (node_id,))  # noqa: S608
         self._write("DELETE FROM node WHERE id = ?", (node_id,))
         self.set_meta("next_node", self._next_node)
+
+    def _rehome_doors(self, node_id: int) -> None:
+        """Let the doors in a node's frame stand in that of its nearest neighbour, as `edges_of` has it."""
+        doors = list(self.query("SELECT id, x, y, yaw FROM door WHERE node = ?", (node_id,)))
+        edges = self.edges_of(node_id) if doors else []
+        if not edges:
+            self._write("DELETE FROM door WHERE node = ?", (node_id,))
+            return
+        edge = min(edges, key=lambda edge: edge.length_m)
+        other_id = edge.other(node_id)
+        for door_id, *pose in doors:
+            x, y, yaw = compose(edge.seen_from(other_id), np.array(pose)).tolist()
+            values = (other_id, x, y, yaw, door_id)
+            self._write("UPDATE door SET node = ?, x = ?, y = ?, yaw = ? WHERE id = ?", values)
 
     def place(self, node_id: int) -> Place | None:
         """Return a node's localisation data, None when it has none yet."""
@@ -385,6 +403,7 @@ class TopoStore:
         if edge is None:
             return
         self._write("DELETE FROM edge WHERE id = ?", (edge_id,))
+        self._write("DELETE FROM door_edge WHERE edge = ?", (edge_id,))
         self.set_meta("next_edge", self._next_edge)
         self._changed(edge.source_id, edge.target_id)
 

@@ -1,4 +1,4 @@
-"""Poses and their covariances."""
+"""Covariances that go along with poses: the laws of se2, for the loops that cannot call it."""
 
 import math
 
@@ -33,16 +33,6 @@ def drifted(drift: Values, before: Values, after: Values, step_covariance: Value
                     total += rotate[p, m] * step_covariance[m, n] * rotate[q, n]
             out[p, q] = total
     return out
-
-
-@njit(nogil=True, cache=True)
-def pose_between(a: Values, b: Values) -> Values:
-    """Return T_a_b of two poses in one frame; same as se2.between on two single poses."""
-    c, s = math.cos(a[2]), math.sin(a[2])
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    turn = b[2] - a[2]
-    turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
-    return np.array([c * dx + s * dy, -s * dx + c * dy, turn])
 
 
 @njit(nogil=True, cache=True)

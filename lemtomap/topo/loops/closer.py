@@ -256,6 +256,7 @@ class LoopCloser:
             self._testify(task, match)
             return
         hypothesis = None
+        match = None if match is None else self._judge.sighted(match, task)
         if match is not None and self._is_news(match, task):
             hypothesis = self.hypotheses.add(self._judge.sighting(task, match))
             if self.log:
@@ -271,12 +272,8 @@ class LoopCloser:
             task.hearing_for.heard = True
 
     def _is_news(self, match: SearchMatch, task: Task) -> bool:
-        """Return True if a search found a place where the mapper does not have it anyway."""
-        return (
-            self._judge.is_sighting(match, task)
-            and not self._confirms(match, task)
-            and not self._judge.is_alias(match, task)
-        )
+        """Return True if a place stands where the mapper does not have it anyway."""
+        return not self._confirms(match, task) and not self._judge.is_alias(match, task)
 
     def _testify(self, task: Task, match: SearchMatch | None) -> None:
         """Let a place speak for or against the closures by which it must be here; silent when unsure."""

@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lemtomap.se2 import Pose, between, compose
+from lemtomap.se2 import Pose, between, compose, wrap_angle
 from lemtomap.topo.graph import Covariance, chain_covariance, reversed_covariance
 from lemtomap.topo.loops.cases import Task
 from lemtomap.topo.loops.config import LoopConfig
 from lemtomap.topo.loops.hypotheses import Sighting
-from lemtomap.topo.loops.matcher import SearchMatch
+from lemtomap.topo.loops.matcher import SearchBox, SearchMatch
 from lemtomap.topo.loops.pictures import Placed, picture_of, told_apart
 from lemtomap.topo.loops.places import LocalSubmap, PlaceBook
 
@@ -41,6 +42,55 @@ class Judge:
             and match.rival <= config.rival
             and explained >= config.points
         )
+
+    def sighted(self, match: SearchMatch, task: Task) -> SearchMatch | None:
+        """Return a place as found, or as it stands where the graph expects it; None if neither fits."""
+        return match if self.is_sighting(match, task) else self._as_expected(match, task)
+
+    def _as_expected(self, match: SearchMatch, task: Task) -> SearchMatch | None:
+        """Return a place where the graph expects it, if it fits there as well as anywhere, else None.
+
+        Along one wall a search finds a place anywhere, and none of these poses is unique. But where the
+        graph knows the place, one needs no proof: that nearest to where it should be.
+        The wall says how far it is away and how it turns; the graph says what the wall does not.
+        """
+        config, here, company = self.config, task.situation, self.company(task)
+        if company is None or here.here_id not in here.measured or task.way_m < config.gate.least_way_m:
+            return None
+        if not task.box.is_known_within(config.expected_sigma_m):
+            return None
+        fits = [
+            task.reference.refine(company.points_node, seed) for seed in self._along_wall(match, task.box)
+        ]
+        best = max(each.explained for each in fits)
+        as_good = [each for each in fits if each.explained >= best - config.expected_slack]
+        nearest = min(as_good, key=lambda each: task.box.off_m(each.T_grid_place))
+        explained = nearest.explained * nearest.known * len(company.points_node)
+        fits_here = (
+            self._is_expected(nearest, task.box)
+            and nearest.explained >= max(config.explained, match.explained - config.expected_slack)
+            and nearest.contradicted <= config.contradicted
+            and nearest.known >= config.known
+            and explained >= config.points
+            and task.reference.found_in(company.points_node, nearest.T_grid_place) >= config.found
+        )
+        return nearest if fits_here else None
+
+    def _along_wall(self, match: SearchMatch, box: SearchBox) -> list[Pose]:
+        """Return poses along the wall on which a place was found, around where the graph expects it."""
+        along = _weak_axis(match)
+        off = box.expected[:2] - match.T_grid_place[:2]
+        middle = match.T_grid_place[:2] + along * float(along @ off)
+        steps_m = np.arange(
+            -self.config.expected_m, self.config.expected_m + 1e-9, self.config.expected_step_m
+        )
+        return [np.array([*(middle + step_m * along), match.T_grid_place[2]]) for step_m in steps_m]
+
+    def _is_expected(self, match: SearchMatch, box: SearchBox) -> bool:
+        """Return True if a place is where the graph knows it to be: like door frames are further apart."""
+        off_rad = abs(float(wrap_angle(match.T_grid_place[2] - box.expected[2])))
+        near = box.off_m(match.T_grid_place) <= self.config.expected_m and off_rad <= self.config.expected_rad
+        return near and box.is_known_within(self.config.expected_sigma_m)
 
     def is_alias(self, match: SearchMatch, task: Task) -> bool:
         """Return True if a place found elsewhere than the graph has it only resembles what is known there.
@@ -99,12 +149,14 @@ class Judge:
         """Return how much a sighting counts: less for each reason to think that it may be chance.
 
         Along a corridor a place is told by a few door frames, and they repeat; the next metre of travel
-        sees the same frames again, so that only more of the way can tell.
+        sees the same frames again, so that only more of the way can tell. Frames do not repeat within
+        `expected_m` of where the graph knows the place to be.
         """
         config = self.config
         company = self.places.company(task.node_id)
         found = 0.0 if company is None else task.reference.found_in(company.points_node, match.T_grid_place)
-        along = config.corridor_weight if match.weakest < config.corridor else 1.0
+        is_proven = match.weakest >= config.corridor or self._is_expected(match, task.box)
+        along = 1.0 if is_proven else config.corridor_weight
         doubts = [task.box.surprise(match.T_grid_place) > config.surprise, found < config.found]
         return float(along * 0.5 ** sum(doubts))
 
@@ -119,3 +171,10 @@ class Judge:
 
 def _gap_m(T_grid_node: Pose, match: SearchMatch) -> float:
     return float(np.hypot(*(T_grid_node[:2] - match.T_grid_place[:2])))
+
+
+def _weak_axis(match: SearchMatch) -> NDArray[np.float64]:
+    """Return the direction in which a match is least sure, unit vector float64 (2,), grid frame."""
+    x, y = np.linalg.eigh(match.covariance[:2, :2])[1][:, -1]
+    cos, sin = np.cos(match.T_grid_place[2]), np.sin(match.T_grid_place[2])
+    return np.array([cos * x - sin * y, sin * x + cos * y])

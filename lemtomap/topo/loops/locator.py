@@ -68,7 +68,7 @@ class WindowSnapshot:
         )
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Guess:
     """One belief about where this is: a known node, and where in the window it stands then."""
 
@@ -178,8 +178,8 @@ class Locator:
             T_grid_node = compose(view.look.T_grid_base, inverse(T_node_base))
             guess = Guess(node_id, T_grid_node, [], None, view.look.travelled_m, view.look.turned_rad)
             self._check(guess, view)
-            if guess.fit >= self.config.plausible and not any(self._same(guess, g) for g in self.guesses):
-                self.guesses.append(guess)
+            if guess.fit >= self.config.plausible:
+                self._enter(guess, self.guesses)
 
     # -- guesses
     # ----------------------------------------------------------------------------------------------
@@ -220,6 +220,16 @@ class Locator:
                 best, best_m = (node_id, at), gap_m
         return best
 
+    def _enter(self, guess: Guess, guesses: list[Guess]) -> None:
+        """Add a guess, unless one that has been checked longer and fits about as well is the same place.
+
+        One that fits clearly better takes its place, and has all checks before it: the other may stand on the
+        far face of a wall, from where no alignment moves it.
+        """
+        alike = [other for other in guesses if self._same(guess, other)]
+        if all(guess.fit - other.fit >= self.config.margin for other in alike):
+            guesses[:] = [*(other for other in guesses if other not in alike), guess]
+
     def _same(self, a: Guess, b: Guess) -> bool:
         """Return True if two guesses put the robot at the same place of the map."""
         T_a_b = self.places.around(a.node_id, self.config.follow_m, 48).get(b.node_id)
@@ -250,11 +260,10 @@ class Locator:
         return off_m <= slack_m and off_rad <= slack_rad
 
     def _unite(self) -> None:
-        """Keep the best guesses, each once, the one checked longest of those alike."""
+        """Keep the best guesses, each place once."""
         kept: list[Guess] = []
         for guess in sorted(self.guesses, key=lambda each: (-len(each.fits), -each.fit)):
-            if not any(self._same(guess, other) for other in kept):
-                kept.append(guess)
+            self._enter(guess, kept)
         self.guesses = sorted(kept, key=lambda each: -each.fit)[: self.config.guesses]
 
     def _certain(self) -> Found | None:

@@ -44,12 +44,24 @@ class SearchBox:
     is_cut: bool = False
     """Whether the place may lie outside as well, so that the graph has little say."""
 
+    @property
+    def expected(self) -> Pose:
+        """Where the place should be, T_grid_place."""
+        return self.T_grid_place if self.T_grid_expected is None else self.T_grid_expected
+
+    def off_m(self, T_grid_place: Pose) -> float:
+        """Return how far a pose is from where the place should be."""
+        return float(np.hypot(*(T_grid_place[:2] - self.expected[:2])))
+
+    def is_known_within(self, sigma_m: float) -> bool:
+        """Return True if the graph knows where the place is to so many metres, one sigma."""
+        return not self.is_cut and self.sigma is not None and float(self.sigma[:2].max()) <= sigma_m
+
     def surprise(self, T_grid_place: Pose) -> float:
         """Return how many sigmas a pose is away from the expected one, on the axis where it is most."""
         if self.sigma is None:
             return 0.0
-        expected = self.T_grid_place if self.T_grid_expected is None else self.T_grid_expected
-        off = np.abs(T_grid_place - expected)
+        off = np.abs(T_grid_place - self.expected)
         off[2] = abs(wrap_angle(off[2]))
         return float((off / np.maximum(self.sigma, LEAST_SIGMA)).max())
 

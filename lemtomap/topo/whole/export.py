@@ -44,22 +44,41 @@ def left_out(store: TopoStore) -> tuple[int, int]:
     return kinds[True, True] + kinds[True, False], kinds[False, False]
 
 
-def write_geojson(store: TopoStore, path: Path) -> None:
-    """Write nav2's route graph. Node and edge IDs share one space there, and edges go one way."""
+Marks = Callable[[int], dict[str, Any]]
+
+
+def no_marks(_: int) -> dict[str, Any]:
+    """Return nothing to say of a node or an edge."""
+    return {}
+
+
+def write_geojson(
+    store: TopoStore, path: Path, node_marks: Marks = no_marks, edge_marks: Marks = no_marks
+) -> None:
+    """Write nav2's route graph. Node and edge IDs share one space there, and edges go one way.
+
+    What `node_marks` and `edge_marks` say of an ID goes into its metadata.
+    """
     layout, names = _laid_out(store, path), _shown_names(store)
     shift = max(layout.T_map_node) + 1
-    features = [_geojson_node(node_id, T, names) for node_id, T in layout.T_map_node.items()]
+    features = [
+        _geojson_node(node_id, T, names, node_marks(node_id)) for node_id, T in layout.T_map_node.items()
+    ]
     for edge in ways(store):
         ends = (edge.source_id, edge.target_id)
         for way, (start, end) in enumerate((ends, ends[::-1])):
-            features.append(_geojson_edge(shift + 2 * edge.edge_id + way, start, end, edge, layout))
+            feature = _geojson_edge(shift + 2 * edge.edge_id + way, start, end, edge, layout)
+            feature["properties"]["metadata"] |= edge_marks(edge.edge_id)
+            features.append(feature)
     label = {"type": "FeatureCollection", "name": shown(path.stem), "comment": APPROXIMATE}
     whole = {**label, "features": features}
     _write(path, json.dumps(whole, indent=1))
 
 
-def _geojson_node(node_id: int, T_map_node: Pose, names: dict[int, str]) -> dict[str, Any]:
-    metadata = {"yaw": float(T_map_node[2])} | ({"name": names[node_id]} if node_id in names else {})
+def _geojson_node(
+    node_id: int, T_map_node: Pose, names: dict[int, str], marks: dict[str, Any]
+) -> dict[str, Any]:
+    metadata = {"yaw": float(T_map_node[2])} | ({"name": names[node_id]} if node_id in names else {}) | marks
     return {
         "type": "Feature",
         "geometry": {"type": "Point", "coordinates": [float(T_map_node[0]), float(T_map_node[1])]},

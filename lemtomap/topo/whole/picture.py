@@ -1,14 +1,17 @@
 """A picture of the whole map for a person: nodes, edges by type, names."""
 
+from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from lemtomap.errors import BadInput
+from lemtomap.se2 import Pose
 from lemtomap.topo.file.store import TopoStore
 from lemtomap.topo.graph import Edge
 from lemtomap.topo.naming import shown
@@ -26,16 +29,24 @@ CLOSED, UNPROVEN = "#14213d", "#d1495b"
 MAX_INCHES = 16.0
 
 
-def write_png(store: TopoStore, path: Path, dots_per_inch: int = 110) -> None:
-    """Draw the map. Raises BadInput when it has no node or the file cannot be written."""
+def write_png(
+    store: TopoStore,
+    path: Path,
+    dots_per_inch: int = 110,
+    paint: Callable[[Axes, Mapping[int, Pose]], None] | None = None,
+) -> None:
+    """Draw the map. Raises BadInput when it has no node or the file cannot be written.
+
+    `paint` may draw over it, and is told where each node stands, T_map_node.
+    """
     with plain_text():
-        figure = _drawn(store)
+        figure = _drawn(store, paint)
         picture = BytesIO()
         figure.savefig(picture, dpi=dots_per_inch, format="png")
     write_whole(path, picture.getvalue())
 
 
-def _drawn(store: TopoStore) -> Figure:
+def _drawn(store: TopoStore, paint: Callable[[Axes, Mapping[int, Pose]], None] | None) -> Figure:
     layout = lay_out(store)
     if not layout.T_map_node:
         raise BadInput(f"{store.path}: an empty map has no picture")
@@ -60,6 +71,8 @@ def _drawn(store: TopoStore) -> Figure:
     axes.plot(at[:, 0], at[:, 1], ".", color="#14213d", markersize=4, label=f"nodes ({len(at)})")
     for name, node_id in store.names().items():
         write_name(axes, name, layout.T_map_node[node_id], xytext=(5, 5))
+    if paint is not None:
+        paint(axes, layout.T_map_node)
     axes.legend(loc="upper left", fontsize="small")
     axes.set_title(f"{shown(store.path.name)}: {APPROXIMATE}", fontsize="small")
     axes.autoscale_view()

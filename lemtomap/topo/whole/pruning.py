@@ -86,7 +86,10 @@ def _older_beside(
 
 
 def _wall_between(graph: PagedGraph, node_id: int, T_node_other: Pose, config: PruneConfig) -> bool:
-    """Return True if stored obstacles of a node lie on the line to another; a node without data sees none."""
+    """Return True if stored obstacles of a node lie on the line to another; a node without data sees none.
+
+    No window is left of a place seen long ago: its obstacles are points, no cells for first_on_line.
+    """
     place = graph.store.place(node_id)
     if place is None:
         return False

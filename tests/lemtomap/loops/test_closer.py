@@ -17,7 +17,7 @@ def closer():
 def conclude(closer, follows, supports, *, against):
     """End a search that was made for one belief and whose sighting, if any, supports another."""
     closer._judge = SimpleNamespace(
-        is_sighting=lambda *_: supports is not None,
+        sighted=lambda match, _: match if supports is not None else None,
         is_alias=lambda *_: False,
         sighting=lambda *_: None,
         contradicts=lambda _: against,

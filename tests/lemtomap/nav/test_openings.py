@@ -87,6 +87,27 @@ def test_belongs_to_the_node_that_sees_it_not_to_the_nearest():
     assert openings.of_state(OpeningState.OPEN)[0].node_id == 1
 
 
+def kept_at(walls, nodes, here_id):
+    """The node beside which an opening at EDGE is kept."""
+    openings = Openings()
+    openings.match([Opening(EDGE, 0.0, 1.0)], ground([DARK_ROOM], walls), nodes, here_id, 0.0)
+    return openings.of_state(OpeningState.OPEN)[0].node_id
+
+
+def test_belongs_to_no_node_that_sees_it_only_through_a_rack_the_robot_does_not_fit_through():
+    posts = [(x, 3.4, x + 0.05, 3.45) for x in np.arange(0.0, 6.0, 0.3)]
+    nodes = NODES | {2: se2.pose(3.97, 4.2, 0.0)}
+    assert kept_at(posts, nodes, here_id=2) == 1
+    assert kept_at([], nodes, here_id=2) == 2
+
+
+def test_belongs_to_the_node_with_the_shortest_way_where_none_has_a_straight_one():
+    """One 1.8 m from the robot's start was kept 14.6 m away, beside the node that had seen it first."""
+    screens = [(3.3, 2.6, 3.4, 3.4), (0.5, 2.0, 0.6, 6.0)]
+    nodes = {1: se2.pose(2.8, 3.0, 0.0), 2: se2.pose(0.2, 5.0, 0.0)}
+    assert kept_at(screens, nodes, here_id=2) == 1
+
+
 def test_a_failed_one_waits_and_a_closed_one_in_reach_gets_one_more_chance():
     openings, number = one_opening()
     again = [Opening(EDGE, 0.0, 1.0)]

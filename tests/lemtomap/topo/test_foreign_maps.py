@@ -41,6 +41,8 @@ def sound(tmp_path_factory):
     store.add_edge(Edge(0, 1, 2, np.array([1.0, 0.2, 0.3]), np.eye(3) * 1e-3, EdgeType.ODOMETRY))
     store.write("INSERT INTO place_split VALUES(0, 3, 100, 1, 2)")
     store.write("INSERT INTO area VALUES(1, 'east', NULL, NULL)")
+    store.write("INSERT INTO door VALUES(1, 2, 0.5, 0.0, 0.1, 0.9, 3, 0, 2.0, NULL, 1, 1)")
+    store.write("INSERT INTO door_edge VALUES(1, 1)")
     store.add_placeholder(Placeholder(0, 2, 1.0, 2.0, 0.5, 1.0))
     store.add_mark(Mark(0, 1, "bump", 0.1, 0.2, 3.0))
     store.put_ground(1, b"picture")

@@ -21,6 +21,9 @@ class Line:
     def has_node(self, node_id):
         return 1 <= node_id <= 9
 
+    def area_nodes(self, place):
+        return {"area:7": [3, 4], "office 3": [3, 4]}.get(place, [])
+
     def node_of(self, name):
         return 4 if name == "kitchen" else None
 
@@ -118,3 +121,9 @@ def test_a_lift_is_told_to_the_map_between_two_missions():
     for wrong in ("level:", "level:up", "level"):
         with pytest.raises(BadSetting, match="level:N"):
             parse_mission(wrong)
+
+
+@pytest.mark.parametrize("place", ["area:7", "office 3"])
+def test_going_to_an_area_goes_to_its_node_with_the_shortest_way(place):
+    assert GoTo(place).step(moment(NavState.IDLE, 1, here=8)).goal.node_id == 4
+    assert GoTo(place).step(moment(NavState.IDLE, 1, here=1)).goal.node_id == 3

@@ -31,6 +31,7 @@ from lemtomap.sim.world import (
     Surface,
 )
 from tools.bench.nav_parts.lead import Rig, rig_of, round_trip
+from tools.truth.walls import wall_between
 
 DOOR_HALF_M = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3)
 """Half the width of the doors there are. One that stuck out behind the walls would be a new thing there."""
@@ -118,9 +119,7 @@ class Drive:
 
     def _in_sight(self, T_world_base: Pose) -> bool:
         """Return True if no wall of the plan, in which the barrier is not, stands before it."""
-        raster = self.rig.simulator.world.raster
-        line = np.linspace(T_world_base[:2], self.barrier[:2], round(IN_SIGHT_M / raster.resolution_m))
-        return not any(raster.occupied[raster.cell(x, y)] for x, y in line.tolist())
+        return not wall_between(self.rig.simulator.world.raster, T_world_base, np.array(self.barrier))
 
     def run(self) -> "Drive":
         """Drive to the end."""

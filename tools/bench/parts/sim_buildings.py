@@ -9,9 +9,9 @@ import numpy as np
 from lemtomap.sim import furniture, worlds
 from lemtomap.sim.floorplan import FloorPlan
 from lemtomap.sim.raster import clearance_m, rasterise
+from lemtomap.sim.truth.model import Doorway
 from lemtomap.sim.world import (
     Box,
-    Door,
     Surface,
     World,
 )
@@ -97,7 +97,7 @@ def _elsewhere(piece: list[Box], world: World, rng: np.random.Generator) -> list
     return piece
 
 
-def _leaf(door: Door) -> Box:
+def _leaf(door: Doorway) -> Box:
     """Return the leaf of a shut door."""
     (x0, y0), (x1, y1) = door.ends
     half = (math.dist((x0, y0), (x1, y1)) / 2, 0.03, 1.0)

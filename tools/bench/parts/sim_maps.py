@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from lemtomap.displacement import RIGHT_M, RIGHT_RAD
@@ -32,6 +31,7 @@ from lemtomap.topo.whole.pruning import prune
 from lemtomap.types import MapView
 from tools.bench.parts.sim_robot import Seen
 from tools.truth.revisits import OLD_M, Revisits
+from tools.truth.walls import wall_between
 
 WRONG_M, WRONG_RAD = 0.5, math.radians(10.0)  # a closure beyond either joins the wrong places
 BINS = 20
@@ -139,7 +139,7 @@ class JudgedMap:
         ids = list(self._at_birth_m)
         places = np.array([self.born[i][:2] for i in ids])
         near = np.flatnonzero(np.hypot(*(places - T_world_base[:2]).T) <= NEAR_M)
-        seen = [ids[k] for k in near if self._in_sight(T_world_base, places[k])]
+        seen = [ids[k] for k in near if not wall_between(self._world.raster, T_world_base, places[k])]
         way_m = self.score.path_m
         ages_m = {i: way_m - self._at_birth_m[i] for i in seen}
         known = self.topo.graph.reach(self.view.associated_id, APART_M)
@@ -147,12 +147,6 @@ class JudgedMap:
         self._revisits.look(
             way_m, max(ages_m.values(), default=None), known=any(node_id in known for node_id in old)
         )
-
-    def _in_sight(self, a: Pose, b: NDArray[np.float64]) -> bool:
-        raster = self._world.raster
-        steps = max(2, int(np.hypot(*(b - a[:2])) / (0.5 * raster.resolution_m)))
-        points = a[:2] + np.linspace(0.0, 1.0, steps)[:, None] * (b - a[:2])
-        return not any(raster.occupied[raster.cell(float(x), float(y))] for x, y in points)
 
     def close(self) -> Score:
         """Write the map and the truth beside it; return the score."""

@@ -35,6 +35,18 @@ class Wheels:
     drift_rad: float
     scale: float
 
+    def scales(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return by what one robot's wheels mistake x, y and yaw throughout a drive, float64 (3,)."""
+        return 1.0 + np.array([self.scale, 0.0, self.scale]) * rng.standard_normal(3)
+
+    def told(
+        self, step: se2.Pose, scales: NDArray[np.float64], rng: np.random.Generator
+    ) -> NDArray[np.float64]:
+        """Return what the wheels tell of a step, float64 (3,)."""
+        noise = np.array([self.way * abs(step[0]), 0.0, self.turn * abs(step[2])])
+        noise[2] = math.hypot(noise[2], self.drift_rad * math.sqrt(abs(step[0])))
+        return np.asarray(step * scales + noise * rng.standard_normal(3))
+
 
 @dataclass(frozen=True, slots=True)
 class Scene:
@@ -138,15 +150,13 @@ def drive(name: str, wheels: Wheels, seed: int) -> Drive:
     rng = np.random.default_rng(seed)
     where = scene(name, rng)
     truths = path(where.corners)
-    scales = 1.0 + np.array([wheels.scale, 0.0, wheels.scale]) * rng.standard_normal(3)
+    scales = wheels.scales(rng)
     slam, T_odom_base = SLAMS["window"](SlamConfig(), seed), truths[0]
     shown, wheeled, matched = [], [], 0
     for index, here in enumerate(truths):
         if index:
-            step = se2.between(truths[index - 1], here)
-            noise = np.array([wheels.way * abs(step[0]), 0.0, wheels.turn * abs(step[2])])
-            noise[2] = math.hypot(noise[2], wheels.drift_rad * math.sqrt(abs(step[0])))
-            T_odom_base = se2.compose(T_odom_base, step * scales + noise * rng.standard_normal(3))
+            step = wheels.told(se2.between(truths[index - 1], here), scales, rng)
+            T_odom_base = se2.compose(T_odom_base, step)
         stamp_s = PERIOD_S * index
         update = slam.update(scan(here, where, rng, stamp_s), Odometry(stamp_s, T_odom_base))
         shown.append(update.T_grid_base)
