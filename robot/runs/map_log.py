@@ -18,7 +18,7 @@ from lemtomap.grid import (
     GrowingGmapping,
 )
 from lemtomap.pipeline import Mapper
-from lemtomap.robot.build import build_slam, build_topo
+from lemtomap.robot.build_map import build_slam, build_topo
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.logs import Log, open_log
 from lemtomap.robot.output import files as outputs

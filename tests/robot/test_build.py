@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lemtomap.errors import BadSetting
-from lemtomap.robot import build
+from lemtomap.robot import build, build_map
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.runs.map_log import chosen
 from lemtomap.robot.settings.check import from_mapping
@@ -13,7 +13,7 @@ from lemtomap.robot.settings.check import from_mapping
 
 def test_a_slam_that_is_none_is_refused_with_those_there_are():
     with pytest.raises(BadSetting, match=r"slam 'magic': must be one of .*window"):
-        build.build_slam("magic", RobotConfig(), 0)
+        build_map.build_slam("magic", RobotConfig(), 0)
 
 
 def test_the_map_file_is_synced_only_where_both_settings_and_caller_want_it(tmp_path, monkeypatch):
@@ -32,8 +32,8 @@ def test_the_map_file_is_synced_only_where_both_settings_and_caller_want_it(tmp_
 
 
 def test_the_seed_reaches_the_slam(monkeypatch):
-    monkeypatch.setitem(build.SLAMS, "window", lambda _config, seed: seed)
-    assert build.build_slam("window", RobotConfig(), 7) == 7
+    monkeypatch.setitem(build_map.SLAMS, "window", lambda _config, seed: seed)
+    assert build_map.build_slam("window", RobotConfig(), 7) == 7
 
 
 @pytest.mark.parametrize(

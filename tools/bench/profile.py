@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from lemtomap.errors import LemtomapError
 from lemtomap.grid import SLAMS
 from lemtomap.pipeline import Mapper
-from lemtomap.robot.build import build_slam, build_topo
+from lemtomap.robot.build_map import build_slam, build_topo
 from lemtomap.robot.child import ROOT
 from lemtomap.robot.output.progress import progress_bar
 from lemtomap.robot.runs.map_log import MapLogOptions, chosen, map_log

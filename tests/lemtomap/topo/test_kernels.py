@@ -3,7 +3,7 @@ import pytest
 
 from lemtomap.se2 import between, compose
 from lemtomap.topo.graph import Edge, chain_covariance
-from lemtomap.topo.kernels import poses, sight
+from lemtomap.topo.kernels import lines, poses, sight
 from lemtomap.types import EdgeType
 from tests.lemtomap.topo.drive import room
 
@@ -65,3 +65,35 @@ def test_outside_the_window_nothing_is_navigable_but_sight_is_not_blocked():
     grid = room(4.0)
     assert not sight.line_is_navigable(grid.occupancy, 0.05, 1.0, 1.0, 5.0, 1.0, 0.18, 50)
     assert sight.line_is_clear(grid.occupancy, 0.05, 1.0, 1.0, 5.0, 1.0, 50)
+
+
+def slow_normals(points, reach_m):
+    """Return what line_normals should: the thin axis of each neighbourhood, and how thin it is."""
+    out = np.zeros((len(points), 3))
+    for k, point in enumerate(points):
+        near = points[np.linalg.norm(points - point, axis=1) <= reach_m]
+        if len(near) >= 3:
+            values, axes = np.linalg.eigh(np.cov(near.T, bias=True))
+            out[k] = *axes[:, 0], 1.0 - values[0] / values[1]
+    return out
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wall_s_direction_comes_from_all_hits_in_reach_and_no_others(seed):
+    rng = np.random.default_rng(seed)
+    along = np.linspace(0.0, 4.0, 60)
+    walls = [
+        np.stack([along, 0.0 * along], -1),
+        np.stack([0.0 * along, along], -1),
+        np.stack([along, along], -1),
+    ]
+    points = np.concatenate([rng.normal(wall - 2.0, 0.02) for wall in walls])
+    normals, expected = lines.line_normals(points, 0.25), slow_normals(points, 0.25)
+    np.testing.assert_allclose(normals[:, 2], expected[:, 2], atol=1e-9)
+    aligned = np.abs(np.sum(normals[:, :2] * expected[:, :2], axis=1))
+    thin = expected[:, 2] > 0.1
+    np.testing.assert_allclose(aligned[thin], 1.0, atol=1e-9)
+
+
+def test_no_hits_have_no_directions():
+    assert lines.line_normals(np.zeros((0, 2)), 0.25).shape == (0, 3)

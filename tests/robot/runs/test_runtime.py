@@ -1,5 +1,6 @@
 """The whole robot in real time on true pseudo-terminals, the fake hardware at their other ends."""
 
+import asyncio
 import re
 import signal
 import subprocess
@@ -40,8 +41,15 @@ def runtime_on(hardware, folder, recorder=None):
 
 
 @pytest.mark.realtime
-def test_the_robot_maps_and_drives_in_real_time_and_leaves_nothing_behind(tmp_path):
+def test_the_robot_maps_and_drives_in_real_time_and_leaves_nothing_behind(tmp_path, monkeypatch):
     warm_up(RobotConfig())
+    naps, sleep = [], asyncio.sleep
+
+    async def counted(delay_s):
+        naps.append(delay_s)
+        await sleep(delay_s)
+
+    monkeypatch.setattr(asyncio, "sleep", counted)
     process = psutil.Process()
     before = process.num_fds(), threading.active_count()
     with FakeHardware("office", 2) as hardware:
@@ -57,6 +65,10 @@ def test_the_robot_maps_and_drives_in_real_time_and_leaves_nothing_behind(tmp_pa
     assert threading.active_count() == before[1]
     samples = [event for _, told in replay_events(Recording.open(tmp_path)) for event in told.base]
     assert len(samples) > 400
+    assert len(naps) < 2.5 * len(samples)  # packets wake the loop; it does not look for them in between
+    spent_s = runtime.core.efforts.threads.spent_s()
+    assert {"base", "mapping", "navigation", "onlooker"} < set(spent_s)
+    assert min(spent_s.values()) >= 0.0
 
 
 @pytest.mark.realtime

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lemtomap.pipeline import Mapper
-from lemtomap.robot import build
+from lemtomap.robot import build, build_map
 from lemtomap.robot.baseline import build_metric_core
 from lemtomap.robot.config import RobotConfig, value_at
 from lemtomap.robot.devices import replay
@@ -181,7 +181,7 @@ def test_a_program_s_mapper_goes_by_the_settings_it_is_given(config, tmp_path):
 
 def test_a_recorded_log_is_mapped_by_the_settings_it_is_given(config, tmp_path):
     store = TopoStore.create(tmp_path / "map.lemto")
-    topo = build.build_topo("window", config, store)
+    topo = build_map.build_topo("window", config, store)
     held_there = {type(thing): thing for thing in inside(topo) if dataclasses.is_dataclass(thing)}
     assert held_there[type(config.topo)] == config.topo
     assert held_there[type(config.loops)] == config.loops
