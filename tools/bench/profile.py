@@ -41,6 +41,7 @@ PARTS = {  # what a module's path begins with: the part it belongs to; the first
     "lemtomap/robot/logs": "reading",
     "robot/logs": "reading",
     "lemtomap/grid": "grid",
+    "lemtomap/areas": "doors and areas",
     "lemtomap/topo/loops": "closing",
     "lemtomap/topo/kernels/search": "closing",
     "lemtomap/topo/whole": "whole map",
