@@ -201,3 +201,7 @@ class MapView:
     particles: NDArray[np.float64] | None = None
     """float64 (N, 3), T_grid_base of each particle."""
     names: Mapping[int, str] = field(default_factory=dict)
+    area_of: Mapping[int, int] = field(default_factory=dict)
+    """Area of each of those nodes; empty where nobody divides the map into areas."""
+    doors: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
+    """Both ends of each door in the window, float64 (2, 2), metres, grid frame."""

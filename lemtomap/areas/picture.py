@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from lemtomap.areas.painting import Painting, colour_of
+from lemtomap.areas.colours import colour_of
+from lemtomap.areas.painting import Painting
 from lemtomap.se2 import Pose, transform
 
 DOOR_COLOUR, SHUT_COLOUR = "#d00000", "#14213d"

@@ -1,7 +1,7 @@
 """Area segmentation as the map grows (thesis, sections 3-3-1 and 3-3-2): look, weigh, pass, cut, label."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +33,10 @@ class AreaSegmenter:
 
     def __init__(self, config: AreaConfig | None = None) -> None:
         self.config = config or AreaConfig()
+        self.area_of: Mapping[int, int] = {}
+        """Area of each node around, at the last look."""
+        self.doors_grid: Mapping[int, NDArray[np.float64]] = {}
+        """Both ends of each door around, float64 (2, 2), metres, in the window at the last look."""
         self._gates: list[Gate] = []
         self._asked: set[int] = set()
         """Nodes around whose doors were read from the map."""
@@ -64,6 +68,16 @@ class AreaSegmenter:
         if changed or is_new_place or self._graph.store.version != self._version:
             self._label(around)
         self._version = self._graph.store.version
+        self._tell(around)
+
+    def _tell(self, around: Neighbourhood) -> None:
+        """Note what others see: which area nodes are of, and where doors are."""
+        self.area_of = {node_id: self._graph.node(node_id).area_id for node_id in around.standings}
+        self.doors_grid = {
+            gate.door.door_id: gate.ends_grid()
+            for gate in self._near
+            if gate.door.door_id and gate.door.is_door and gate.T_grid_gate is not None
+        }
 
     # -- gates ----------------------------------------------------------------------------------------------
 

@@ -430,7 +430,10 @@ class TopoMapper:
         """Return an immutable snapshot of the neighbourhood. Raises NotStarted before the first scan."""
         now, at_id = self.now, self._at.associated_id
         quality = 0.0 if self.lost else self._at.quality(self.config.watch)
-        return self._snapshots.take(now, at_id, quality, lost=self.lost, particles=particles)
+        view = self._snapshots.take(now, at_id, quality, lost=self.lost, particles=particles)
+        if self._areas is None:
+            return view
+        return replace(view, area_of=self._areas.area_of, doors=self._areas.doors_grid)
 
     def close(self) -> None:
         """Write everything and close the map file; the trail stays readable."""

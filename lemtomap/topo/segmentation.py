@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lemtomap.se2 import Pose
 from lemtomap.topo.file.paging import PagedGraph
 from lemtomap.topo.local import NodePoseEstimate
@@ -39,3 +42,8 @@ class Segmenter(Protocol):
     def update(self, around: Neighbourhood) -> None:
         """Look at the surroundings after a scan, and give nodes their areas."""
         ...
+
+    area_of: Mapping[int, int]
+    """Area of each node around, at the last look."""
+    doors_grid: Mapping[int, NDArray[np.float64]]
+    """Both ends of each door around, float64 (2, 2), metres, in the window at the last look."""

@@ -17,6 +17,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from lemtomap import palette
+from lemtomap.areas.colours import colour_of
 from lemtomap.nav.types import CostmapView
 from lemtomap.robot.devices.parts import DEFAULT_LIMIT, PartFiles
 from lemtomap.robot.output.viewer_config import ViewerConfig
@@ -274,9 +275,9 @@ class Viewer:
         ids = list(view.T_grid_node)
         places = np.array([view.T_grid_node[i] for i in ids]).reshape(-1, 3)[:, :2]
         here = np.array([i == view.associated_id for i in ids], dtype=bool)
-        own, other = (np.array(palette.rgb(colour), np.uint8) for colour in (palette.HERE, palette.NODE))
-        colours = np.where(here[:, None], own, other)
-        labels = [view.names.get(i) or str(i) for i in ids]
+        plain = np.array([_colour_at(view, i) for i in ids]).reshape(-1, 3)
+        colours = np.where(here[:, None], np.array([palette.rgb(palette.HERE)]), plain).astype(np.uint8)
+        labels = [view.names.get(i) or _label_at(view, i) for i in ids]
         nodes = rr.Points3D(
             _lift(places, Z_NODES),
             radii=np.where(here, 0.16, 0.08),
@@ -290,6 +291,11 @@ class Viewer:
             _lift(places[named], Z_NODES), radii=0.01, labels=[labels[k] for k in named], show_labels=True
         )
         self._stream.log("grid/graph/names", names)
+        doors = [_lift(ends, Z_NODES) for ends in view.doors.values()]
+        marks = rr.LineStrips3D(
+            doors, radii=0.05, colors=[208, 0, 0], labels=[f"door {k}" for k in view.doors], show_labels=False
+        )
+        self._stream.log("grid/graph/doors", marks)
         for kind in EdgeType:
             strips = [
                 _lift(np.array([view.T_grid_node[a][:2], view.T_grid_node[b][:2]]), Z_EDGES)
@@ -312,6 +318,18 @@ class Viewer:
             vectors=heading, origins=_lift(poses[:, :2], Z_SCAN), radii=0.012, colors=[255, 140, 0]
         )
         self._stream.log("grid/particles", arrows)
+
+
+def _colour_at(view: MapView, node_id: int) -> list[int]:
+    """Return the colour of a node: that of its area in every picture."""
+    area_id = view.area_of.get(node_id, 0)
+    return list(bytes.fromhex(colour_of(area_id)[1:])) if area_id else [30, 90, 200]
+
+
+def _label_at(view: MapView, node_id: int) -> str:
+    """Return what a node is called in the viewer: its number and its area's."""
+    area_id = view.area_of.get(node_id, 0)
+    return f"{node_id} in area {area_id}" if area_id else str(node_id)
 
 
 def _lift(points: PATHS | Sequence[Sequence[float]], z_m: float) -> NDArray[np.float32]:

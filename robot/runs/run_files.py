@@ -90,6 +90,8 @@ class RunFiles(Onlooker):
         self._walls_due_s, self._preview_due_s, self._folder_due_s = 0.0, record.viewer.preview_s, 0.0
         self._truth: Callable[[], Pose | None] | None = None
         self._scarce = ""
+        self._painting: Painting | None = None
+        """Areas and doors as the map had them when it was closed."""
         self._space_lock = threading.Lock()
         core.mapping.mapper.topo.store.before_commit = self._mind_space
         super().__init__(core.exchange, core.efforts, say=listener.say)
@@ -190,6 +192,7 @@ class RunFiles(Onlooker):
         ending.step("viewer", CLOSE_LIMIT_S, self._view.close)
         view = core.exchange.map_view.get()
         final = self._final(ending, whole_drive=whole_drive) if view is not None else None
+        self._painting = ending.step("areas", WRITE_LIMIT_S, lambda: Painting.of(store))
         ending.step("folder", WRITE_LIMIT_S, self._need_folder)
         ending.step("map", WRITE_LIMIT_S, core.close)
         summary: dict[str, Any] = {**told, "run_s": now_s, "out": self._folder.path, "map": store.path}
@@ -241,7 +244,7 @@ class RunFiles(Onlooker):
             grid=view.grid,
             T_map_grid=final.T_map_grid,
             names=view.names,
-            painting=Painting.of(self._core.mapping.mapper.topo.store),
+            painting=self._painting,
             title=self._title,
             facts=_facts(summary),
         )

@@ -14,6 +14,9 @@ RIDGE = 0.6
 """Clearance grows by less than this a cell, away from the nearest obstacle, where two are about as near."""
 LATERAL = 0.3  # metres beside a gap's axis at which the floor behind it may open
 END_REACH = 0.7  # metres round a gap's end within which its wall is followed
+ISLAND_REACH = 2.0  # ... and within which it may turn out to be an island
+WALL_MOST = 0.5  # metres: what is deeper, and stands free, is furniture or a column
+FREE_SHARE = 0.8  # of the floor round an island; the rest is hidden, or another gap's wall
 FIELDS = 9
 """Of a gap: row and column of both ends, width, opening before and behind it, wall at both ends; in cells."""
 
@@ -70,8 +73,8 @@ def find_gaps(
                 out, count, p_row, p_col, q_row, q_col, wide, before / half, behind / half, resolution
             )
     for k in range(count):
-        out[k, 7] = _wall(occupancy, out[k, 0], out[k, 1], END_REACH / resolution, occupied_from)
-        out[k, 8] = _wall(occupancy, out[k, 2], out[k, 3], END_REACH / resolution, occupied_from)
+        out[k, 7] = _wall(occupancy, out[k, 0], out[k, 1], resolution, occupied_from)
+        out[k, 8] = _wall(occupancy, out[k, 2], out[k, 3], resolution, occupied_from)
     return count
 
 
@@ -182,30 +185,64 @@ def _keep(
 
 
 @njit(nogil=True, cache=True)
-def _wall(occupancy: Cells, row: float, col: float, reach: float, occupied_from: int) -> float:
-    """Return how far, in cells, the obstacle at a gap's end goes on, over holes of a cell, within a reach."""
+def _wall(occupancy: Cells, row: float, col: float, resolution: float, occupied_from: int) -> float:
+    """Return how far, in cells, the obstacle at a gap's end goes on, over holes of a cell, within a reach.
+
+    0 for furniture: what stands free on the floor all round, and is deeper than a wall.
+    """
     rows, cols = occupancy.shape
-    span = int(reach)
+    span = int(ISLAND_REACH / resolution)
     side = 2 * span + 1
     seen = np.zeros((side, side), dtype=np.bool_)
     stack = np.zeros((side * side, 2), dtype=np.int64)
     r0, c0 = int(row), int(col)
-    top = 1
+    top, count = 1, 0
     stack[0, 0], stack[0, 1] = r0, c0
     seen[span, span] = True
-    far = 0.0
+    far, ends = 0.0, False
+    low_r, high_r, low_c, high_c = r0, r0, c0, c0
+    sums = np.zeros(5)
     while top > 0:
         top -= 1
         r, c = stack[top, 0], stack[top, 1]
         far = max(far, math.hypot(r - r0, c - c0))
+        low_r, high_r, low_c, high_c = min(low_r, r), max(high_r, r), min(low_c, c), max(high_c, c)
+        x, y = float(c - c0), float(r - r0)
+        sums += np.array([x, y, x * x, y * y, x * y])
+        count += 1
         for dr in range(-2, 3):
             for dc in range(-2, 3):
                 a, b = r + dr, c + dc
-                if abs(a - r0) > span or abs(b - c0) > span or a < 0 or b < 0 or a >= rows or b >= cols:
+                if a < 0 or b < 0 or a >= rows or b >= cols or occupancy[a, b] < occupied_from:
                     continue
-                if occupancy[a, b] < occupied_from or seen[a - r0 + span, b - c0 + span]:
-                    continue
-                seen[a - r0 + span, b - c0 + span] = True
-                stack[top, 0], stack[top, 1] = a, b
-                top += 1
+                if abs(a - r0) > span or abs(b - c0) > span:
+                    ends = True  # it goes on beyond the reach
+                elif not seen[a - r0 + span, b - c0 + span]:
+                    seen[a - r0 + span, b - c0 + span] = True
+                    stack[top, 0], stack[top, 1] = a, b
+                    top += 1
+    far = min(far, END_REACH / resolution)
+    if ends:
+        return far
+    mean_x, mean_y = sums[0] / count, sums[1] / count
+    xx, yy, xy = sums[2] / count - mean_x**2, sums[3] / count - mean_y**2, sums[4] / count - mean_x * mean_y
+    across = 0.5 * (xx + yy) - math.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+    is_deep = 4.0 * math.sqrt(max(0.0, across)) * resolution > WALL_MOST
+    if is_deep and _stands_free(occupancy, low_r - 3, high_r + 3, low_c - 3, high_c + 3):
+        return 0.0
     return far
+
+
+@njit(nogil=True, cache=True)
+def _stands_free(occupancy: Cells, low_r: int, high_r: int, low_c: int, high_c: int) -> bool:
+    """Return True if nearly all of the floor on the border of a box is known and free."""
+    rows, cols = occupancy.shape
+    if low_r < 0 or low_c < 0 or high_r >= rows or high_c >= cols:
+        return False
+    free, all_round = 0, 0
+    for r in range(low_r, high_r + 1):
+        for c in range(low_c, high_c + 1):
+            if r in (low_r, high_r) or c in (low_c, high_c):
+                all_round += 1
+                free += 0 <= occupancy[r, c] < FREE_BELOW
+    return free >= FREE_SHARE * all_round

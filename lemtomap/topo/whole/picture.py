@@ -41,7 +41,7 @@ def write_png(
     write_whole(path, picture.getvalue())
 
 
-def _drawn(store: TopoStore, paint: Callable[[Axes, Mapping[int, Pose]], None] | None) -> Figure:
+def _drawn(store: TopoStore, paint: Callable[[Axes, Mapping[int, Pose]], None] | None = None) -> Figure:
     layout = lay_out(store)
     if not layout.T_map_node:
         raise BadInput(f"{store.path}: an empty map has no picture")

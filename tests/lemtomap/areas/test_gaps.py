@@ -93,3 +93,14 @@ def test_clearance_is_that_of_an_exact_distance_transform():
 
 def test_without_obstacles_there_are_no_gaps():
     assert gaps(view(np.zeros((240, 240), dtype=np.int8))) == []
+
+
+def test_a_gap_between_a_wall_and_a_table_that_stands_free_is_no_door():
+    table = (-0.6, -4.2, 0.6, -2.7)  # 0.8 m off the wall below it
+    assert gaps(floor_with(table), np.array([-1.0, -4.0, 0.0])) == []
+
+
+def test_a_wall_that_stands_free_between_two_doors_is_a_wall():
+    piece, rest = (-0.1, -0.8, 0.1, 0.8), [(-0.1, 1.7, 0.1, 5.5), (-0.1, -5.5, 0.1, -1.7)]
+    found = gaps(floor_with(piece, *rest), np.array([-1.0, 0.0, 0.0]))
+    assert sorted(round(gap.T_grid_gap[1], 1) for gap in found) == pytest.approx([-1.2, 1.2], abs=0.11)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from lemtomap.areas.book import AreaBook
@@ -197,3 +198,11 @@ def test_a_map_read_again_has_its_doors_and_areas(walk, tmp_path):
         assert door.edges
         assert [AreaBook(store).area_of(k) for k in range(1, 7)] == [1, 1, 1, 2, 2, 2]
         assert [area.id for area in AreaBook(store).areas()] == [1, 2]
+
+
+def test_who_looks_on_is_told_the_areas_and_where_the_doors_are(walk):
+    walk.looks(window(), 3)
+    assert walk.segmenter.area_of == {1: 1, 2: 1, 3: 1, 4: 2, 5: 2, 6: 2}
+    assert walk.segmenter.doors_grid[1] == pytest.approx(np.array([[0.0, -0.45], [0.0, 0.45]]), abs=0.1) or (
+        walk.segmenter.doors_grid[1] == pytest.approx(np.array([[0.0, 0.45], [0.0, -0.45]]), abs=0.1)
+    )
