@@ -212,7 +212,10 @@ def run(
 
 
 def goto(
-    place: Annotated[str, typer.Argument(metavar="PLACE", help="a node's number, its name, far, start")],
+    place: Annotated[
+        str,
+        typer.Argument(metavar="PLACE", help="a node's number or name, an area's name, area:7, far, start"),
+    ],
     map_file: Annotated[
         Path, typer.Option("--map", metavar="FILE.lemto", help="the map that knows the place")
     ],

@@ -121,11 +121,12 @@ def test_a_door_that_the_robot_has_passed_is_not_argued_away(walk):
     assert len(doors(walk)) == 1
 
 
-def test_a_closure_between_two_rooms_merges_them_only_if_it_can_be_driven(walk):
+def test_a_closure_through_a_wall_that_nobody_has_driven_merges_no_areas(walk):
+    left, right = walk.add(-2.5, 2.5, to=1), walk.add(2.5, 2.5, to=6)
     walk.looks(window(), 3)
-    walk.join(1, 6, EdgeType.LOOP_CLOSING, proven=False)
+    walk.join(left, right, EdgeType.LOOP_CLOSING, proven=False)
     walk.looks(window(), 1)
-    assert walk.areas() == [1, 1, 1, 2, 2, 2]
+    assert walk.areas() == [1, 1, 1, 2, 2, 2, 1, 2]
 
 
 def test_a_way_round_without_a_door_merges_two_areas_and_the_older_id_stays(walk):
