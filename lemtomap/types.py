@@ -183,3 +183,8 @@ class MapView:
     particles: NDArray[np.float64] | None = None
     """float64 (N, 3), T_grid_base of each particle."""
     names: Mapping[int, str] = field(default_factory=dict)
+    changed: Mapping[int, Sequence[RouteEdge]] = field(default_factory=dict)
+    """All edges, as they are now, of every node that is new or whose edges changed since the map file was
+    last written: who plans takes them for what the file holds."""
+    graph_version: int = 0
+    """RouteGraph.version of the map with these changes."""

@@ -43,8 +43,6 @@ class MappingStep:
         before, self._published = self._published, view
         if view is before:
             return
-        if before is None or view.associated_id != before.associated_id:
-            self.mapper.topo.store.commit()  # who plans from a node must find it and its edges in the file
         self._exchange.map_view.put(view)
         if view.lost != self._lost:
             self._lost = view.lost
