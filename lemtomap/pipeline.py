@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lemtomap.displacement import Watch
 from lemtomap.errors import BadSample
@@ -51,8 +50,9 @@ class Mapper:
 
     def __init__(self, make_slam: Callable[[], GridSlam], topo: TopoMapper, *, watched: bool = True) -> None:
         """`make_slam` makes a window SLAM, one for each window begun anew. `watched`: where wheels and laser
-        say different things, somebody may have moved the robot. Not so on a recorded drive whose wheels leap,
-        nor in a metric layer that keeps all of its grid.
+        say different things, somebody may have moved the robot. Not so on a recorded drive whose wheels leap
+        and whose scans are stamped late (in ACES and Killian Court laser and wheels differ by up to 0.2 rad
+        from one scan to the next), nor in a metric layer that keeps all of its grid.
         """
         self.topo = topo
         self._make_slam = make_slam
@@ -72,16 +72,21 @@ class Mapper:
         topo: TopoConfig | None = None,
         loops: LoopConfig | None = None,
         seed: int = 0,
+        watched: bool = True,
     ) -> Self:
         """Map into a file with the default window SLAM: a new one, or a map to go on with.
 
-        In a map to go on with the robot may stand anywhere; it is `lost` until it recognises a place. Raises
-        BadMap, BadSetting.
+        In a map to go on with the robot may stand anywhere; it is `lost` until it recognises a place.
+        `watched`: as in the constructor. Raises BadMap, BadSetting.
         """
         known = Path(path).exists()
         store = (TopoStore.open if known else TopoStore.create)(path)
         make_slam = partial(SLAMS[DEFAULT_SLAM], slam or SlamConfig(), seed)
-        return cls(make_slam, TopoMapper(topo or TopoConfig(), store, recogniser=LoopRecogniser(loops)))
+        return cls(
+            make_slam,
+            TopoMapper(topo or TopoConfig(), store, recogniser=LoopRecogniser(loops)),
+            watched=watched,
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -94,15 +99,12 @@ class Mapper:
         self,
         scan: Scan,
         odometry: Odometry,
-        hits_base: NDArray[np.floating] | None = None,
         *,
         lifted: bool = False,
         events: Iterable[NavEvent] = (),
     ) -> Mapped:
-        """Use one scan; odometry is the base at the scan's stamp.
+        """Use one scan; odometry is the base at the scan's stamp, and at each beam where that is known.
 
-        hits_base: the scan's hits, float (N, 2), metres, base frame at its stamp, from whoever knows the
-        odometry at each beam; None: de-skewed by the velocity, as for the window.
         lifted: the wheels hang in the air; events: what navigation found out since the scan before.
         Raises BadSample when the pose of the odometry is no number.
         """
@@ -118,7 +120,7 @@ class Mapper:
         for event in events:
             self._apply(event)
         slam = self._slam.update(scan, odometry)
-        hits = self._slam.points_base() if hits_base is None else hits_base
+        hits = self._slam.points_base()
         moved = self._watch.displaced(slam, odometry, hits) if self._is_watched else ""
         if moved:  # this scan may show both places: the new window begins with the next
             self.lose()

@@ -26,6 +26,9 @@ class Odometry:
     """float64 (3,): x m, y m, yaw rad."""
     v_mps: float = 0.0
     w_radps: float = 0.0
+    T_odom_base_beams: Pose | None = None
+    """float64 (N, 3): the same at each beam of the scan at this stamp, where that is known; None: the
+    velocity has to do."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_odom_base", as_pose("Odometry.T_odom_base", self.T_odom_base))

@@ -22,8 +22,7 @@ class MappingStep:
         level, stamp_s = self.mapper.topo.level, timed.scan.stamp_s
         events = () if timed.lifted else tuple(self._exchange.nav_events.drain())
         self._exchange.mapped_scans.put(MappedScan(stamp_s, timed.lifted, events))
-        hits_base = timed.sighting.hits_base
-        mapped = self.mapper.update(timed.scan, timed.odometry, hits_base, lifted=timed.lifted, events=events)
+        mapped = self.mapper.update(timed.scan, timed.odometry, lifted=timed.lifted, events=events)
         self.scans += mapped.used
         if mapped.displaced:
             self._exchange.note(stamp_s, "mapping", mapped.displaced, NoteLevel.WARN)
