@@ -7,7 +7,7 @@ learnt there and taken off everywhere.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -179,6 +179,13 @@ class OdometryBuffer:
         columns = [np.interp(wanted, stamps, poses[:, column]) for column in range(3)]
         columns[2] = wrap_angle(columns[2])
         return np.stack(columns, axis=-1)
+
+    def odometry_during(self, stamps_s: NDArray[np.floating]) -> Odometry:
+        """Return pose and velocity at the first of a scan's beams, and the poses at all of them.
+
+        stamps_s: float64 (N,). Raises NotCovered.
+        """
+        return replace(self.odometry_at(float(stamps_s[0])), T_odom_base_beams=self.at(stamps_s))
 
     def odometry_at(self, stamp_s: float) -> Odometry:
         """Return pose and velocity at one moment. Raises NotCovered."""

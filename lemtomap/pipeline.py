@@ -9,13 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lemtomap.areas.segmentation import AreaSegmenter
 from lemtomap.displacement import Watch
 from lemtomap.grid import DEFAULT_SLAM, SLAMS, GridSlam, SlamConfig
-from lemtomap.samples import as_finite, as_points, as_whole, check_kind
+from lemtomap.samples import as_finite, as_whole, check_kind
 from lemtomap.topo.config import TopoConfig
 from lemtomap.topo.events import LevelChanged, NavEvent
 from lemtomap.topo.file.store import TopoStore
@@ -52,8 +49,9 @@ class Mapper:
 
     def __init__(self, make_slam: Callable[[], GridSlam], topo: TopoMapper, *, watched: bool = True) -> None:
         """`make_slam` makes a window SLAM, one for each window begun anew. `watched`: where wheels and laser
-        say different things, somebody may have moved the robot. Not so on a recorded drive whose wheels leap,
-        nor in a metric layer that keeps all of its grid.
+        say different things, somebody may have moved the robot. Not so on a recorded drive whose wheels leap
+        and whose scans are stamped late (in ACES and Killian Court laser and wheels differ by up to 0.2 rad
+        from one scan to the next), nor in a metric layer that keeps all of its grid.
         """
         self.topo = topo
         self._make_slam = make_slam
@@ -73,12 +71,13 @@ class Mapper:
         topo: TopoConfig | None = None,
         loops: LoopConfig | None = None,
         seed: int = 0,
+        watched: bool = True,
     ) -> Self:
         """Map into a file with the default window SLAM: a new one, or a map to go on with.
 
         In a map to go on with the robot may stand anywhere; it is `lost` until it recognises a place. `seed`:
-        of all that is random; the same samples and seed make the same map. Raises BadMap, and BadSample for
-        arguments that are none.
+        of all that is random; the same samples and seed make the same map. `watched`: as in the constructor.
+        Raises BadMap, BadSetting, and BadSample for arguments that are none.
         """
         check_kind("Mapper.open: path", path, str, Path)
         as_whole("Mapper.open: seed", seed)
@@ -89,7 +88,8 @@ class Mapper:
         store = (TopoStore.open if known else TopoStore.create)(path)
         make_slam = partial(SLAMS[DEFAULT_SLAM], slam or SlamConfig(), seed)
         recogniser, areas = LoopRecogniser(loops), AreaSegmenter()
-        return cls(make_slam, TopoMapper(topo or TopoConfig(), store, recogniser=recogniser, areas=areas))
+        mapper = TopoMapper(topo or TopoConfig(), store, recogniser=recogniser, areas=areas)
+        return cls(make_slam, mapper, watched=watched)
 
     def __enter__(self) -> Self:
         return self
@@ -102,21 +102,17 @@ class Mapper:
         self,
         scan: Scan,
         odometry: Odometry,
-        hits_base: NDArray[np.floating] | None = None,
         *,
         lifted: bool = False,
         events: Iterable[NavEvent] = (),
     ) -> Mapped:
-        """Use one scan; odometry is the base at the scan's stamp.
+        """Use one scan; odometry is the base at the scan's stamp, and at each beam where that is known.
 
-        hits_base: the scan's hits, float (N, 2), metres, base frame at its stamp, from whoever knows the
-        odometry at each beam; None: de-skewed by the velocity, as for the window.
         lifted: the wheels hang in the air; events: what navigation found out since the scan before.
         Raises BadSample for what is no scan, no odometry or no points, and a pose that is not finite.
         """
         check_kind("Mapper.update: scan", scan, Scan)
         check_kind("Mapper.update: odometry", odometry, Odometry)
-        hits_given = None if hits_base is None else as_points("Mapper.update: hits_base", hits_base)
         as_finite("Odometry.T_odom_base", odometry.T_odom_base)
         if lifted:  # nothing is mapped there
             self._watch.lift(scan.stamp_s)
@@ -128,7 +124,7 @@ class Mapper:
         for event in events:
             self._apply(event)
         slam = self._slam.update(scan, odometry)
-        hits = self._slam.points_base() if hits_given is None else hits_given
+        hits = self._slam.points_base()
         moved = self._watch.displaced(slam, odometry, hits) if self._is_watched else ""
         if moved:  # this scan may show both places: the new window begins with the next
             self.lose()

@@ -49,6 +49,16 @@ def as_points(what: str, values: Any) -> NDArray[np.floating]:
     return points
 
 
+def as_poses(what: str, values: Any) -> NDArray[np.float64]:
+    """Return poses, float64 (N, 3): x m, y m, yaw rad, all finite. Raises BadSample."""
+    poses = _array(what, values, np.float64)
+    if poses.ndim != 2 or poses.shape[1] != 3:
+        raise BadSample(f"{what}: must be poses (N, 3), has shape {poses.shape}")
+    if not np.isfinite(poses).all():
+        raise BadSample(f"{what}: must be finite")
+    return poses
+
+
 def as_number(what: str, value: Any, unit: str, least: float = -math.inf, *, endless: bool = False) -> float:
     """Return one finite number of at least `least`; `endless`: +inf will do too. Raises BadSample."""
     if not isinstance(value, float | int | np.floating | np.integer) or isinstance(value, bool):

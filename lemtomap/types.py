@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lemtomap.samples import as_number, as_pose, as_row
+from lemtomap.samples import as_number, as_pose, as_poses, as_row
 from lemtomap.se2 import Pose
 
 
@@ -29,12 +29,18 @@ class Odometry:
     """Speed forwards, base frame."""
     w_radps: float = 0.0
     """Speed of turning, positive to the left."""
+    T_odom_base_beams: Pose | None = None
+    """float64 (N, 3): the same at each beam of the scan at this stamp, where that is known; None: the
+    velocity has to do."""
 
     def __post_init__(self) -> None:
         as_number("Odometry.stamp_s", self.stamp_s, "seconds")
         as_number("Odometry.v_mps", self.v_mps, "metres per second")
         as_number("Odometry.w_radps", self.w_radps, "radians per second")
         object.__setattr__(self, "T_odom_base", as_pose("Odometry.T_odom_base", self.T_odom_base))
+        if self.T_odom_base_beams is not None:
+            beams = as_poses("Odometry.T_odom_base_beams", self.T_odom_base_beams)
+            object.__setattr__(self, "T_odom_base_beams", beams)
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,3 +211,8 @@ class MapView:
     """Area of each of those nodes; empty where nobody divides the map into areas."""
     doors: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
     """Both ends of each door in the window, float64 (2, 2), metres, grid frame."""
+    changed: Mapping[int, Sequence[RouteEdge]] = field(default_factory=dict)
+    """All edges, as they are now, of every node that is new or whose edges changed since the map file was
+    last written: who plans takes them for what the file holds."""
+    graph_version: int = 0
+    """RouteGraph.version of the map with these changes."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lemtomap.deskew import motion_during
 from lemtomap.drivers.hokuyo.events import LaserScan
 from lemtomap.drivers.hokuyo.session import HokuyoEvent
 from lemtomap.drivers.kobuki.battery import ChargeLevel
@@ -21,7 +22,7 @@ from lemtomap.drivers.kobuki.events import (
     LinkUp,
 )
 from lemtomap.drivers.kobuki.session import KobukiEvent
-from lemtomap.nav.types import ContactKind, NavState
+from lemtomap.nav.types import ContactKind, NavState, ObstacleSighting
 from lemtomap.odometry import OdometryBuffer, WheelGyroOdometry
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.devices import bridge
@@ -53,7 +54,6 @@ from lemtomap.robot.motion.velocity import (
     Wish,
 )
 from lemtomap.robot.motion.watchdog import Watchdog
-from lemtomap.se2 import Pose
 from lemtomap.types import Odometry, Scan, Twist
 
 SCAN_PATIENCE_S = 0.3  # a scan whose odometry has not come by then belongs to a silent base
@@ -181,11 +181,11 @@ class BaseStep:
                 continue
             seen = self._waiting.popleft()
             if self._buffer.covers(scan.stamp_s):
-                self._hand_on(seen, scan, self._buffer.at(stamps_s))
+                self._hand_on(seen, scan, self._buffer.odometry_during(stamps_s))
 
-    def _hand_on(self, seen: LaserScan, scan: Scan, poses: Pose) -> None:
-        sighting = bridge.deskewed_sighting(scan, poses)
-        odometry = self._buffer.odometry_at(scan.stamp_s)
+    def _hand_on(self, seen: LaserScan, scan: Scan, odometry: Odometry) -> None:
+        motion = motion_during(scan, odometry)
+        sighting = ObstacleSighting.from_scan(scan, odometry.T_odom_base, T_base_beams=motion)
         valid = int(np.count_nonzero(~np.isnan(scan.ranges_m)))
         timed = TimedScan(scan, odometry, sighting, seen.arrival_s, valid, self._hangs)
         self._scan = timed

@@ -22,8 +22,7 @@ class MappingStep:
         level, stamp_s = self.mapper.topo.level, timed.scan.stamp_s
         events = () if timed.lifted else tuple(self._exchange.nav_events.drain())
         self._exchange.mapped_scans.put(MappedScan(stamp_s, timed.lifted, events))
-        hits_base = timed.sighting.hits_base
-        mapped = self.mapper.update(timed.scan, timed.odometry, hits_base, lifted=timed.lifted, events=events)
+        mapped = self.mapper.update(timed.scan, timed.odometry, lifted=timed.lifted, events=events)
         self.scans += mapped.used
         if mapped.displaced:
             self._exchange.note(stamp_s, "mapping", mapped.displaced, NoteLevel.WARN)
@@ -43,8 +42,6 @@ class MappingStep:
         before, self._published = self._published, view
         if view is before:
             return
-        if before is None or view.associated_id != before.associated_id:
-            self.mapper.topo.store.commit()  # who plans from a node must find it and its edges in the file
         self._exchange.map_view.put(view)
         if view.lost != self._lost:
             self._lost = view.lost

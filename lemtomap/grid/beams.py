@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.deskew import motion_during
 from lemtomap.grid.kernels import scan as kernels
 from lemtomap.types import Odometry, Scan
 
@@ -34,7 +35,7 @@ class ScanPreparer:
         self._directions = np.empty((0, 2), dtype=np.float64)
 
     def __call__(self, scan: Scan, odometry: Odometry, usable_range_m: float) -> Beams:
-        """Return the beams, de-skewed by the velocity of the odometry."""
+        """Return the beams, de-skewed. Raises BadSample."""
         geometry = (len(scan.ranges_m), scan.angle_min_rad, scan.angle_step_rad)
         if geometry != self._geometry:
             angles = scan.angle_min_rad + scan.angle_step_rad * np.arange(len(scan.ranges_m))
@@ -45,7 +46,7 @@ class ScanPreparer:
             scan.ranges_m,
             self._directions,
             scan.T_base_laser,
-            (odometry.v_mps, odometry.w_radps, scan.time_step_s),
+            motion_during(scan, odometry),
             (scan.range_min_m, math.nextafter(usable_range_m, math.inf), scan.silent_free_m),
             points[0],
             points[1],

@@ -32,8 +32,8 @@ class GridSlam(Protocol):
     """A mapper of the metric layer."""
 
     def update(self, scan: Scan, odometry: Odometry) -> SlamUpdate:
-        """Use one scan; call it for every scan. odometry: the base at the scan's stamp; its velocity
-        de-skews.
+        """Use one scan; call it for every scan. odometry: the base at the scan's stamp, and at
+        its beams or how fast, which de-skews.
         """
         ...
 

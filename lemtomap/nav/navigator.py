@@ -28,6 +28,7 @@ from lemtomap.nav.motion.recovery import (
 )
 from lemtomap.nav.outlook import FarLook, Lookout, WindowLook
 from lemtomap.nav.places import goal_at
+from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.sliding import Target, is_roundabout, place_of
 from lemtomap.nav.route.watching import EdgeClock
@@ -202,7 +203,8 @@ class Navigator:
         self._cycle += 1
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
         speed = REST if bumps else self._speed(twist)  # a bump has stopped the robot, or must
-        moment = CycleInput(map_view, graph, T_odom_base, T_grid_base, speed, now_s)
+        fresh = FreshGraph(graph, map_view)
+        moment = CycleInput(map_view, fresh, T_odom_base, T_grid_base, speed, now_s)
         self._way_back.drove(T_odom_base)
         self.surroundings.recall(graph, now_s)
         self.surroundings.take(map_view, _as_sightings(scan_points_base, T_odom_base, now_s))
@@ -210,9 +212,9 @@ class Navigator:
         output = self._act(moment) if self._goal is not None else self._rest(moment)
         self._command = output.twist
         driving = output.state in {NavState.DRIVING, NavState.TURNING}
-        traversed = self._edge_clock.step(map_view.associated_id, graph, now_s, driving=driving)
+        traversed = self._edge_clock.step(map_view.associated_id, fresh, now_s, driving=driving)
         if traversed is not None:
-            self._way.passed(traversed, graph)
+            self._way.passed(traversed, fresh)
         events = (*moment.events, *((traversed,) if traversed else ()))
         return replace(output, events=events, cycle=self._cycle)
 

@@ -7,8 +7,9 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from lemtomap.deskew import UNMOVED
 from lemtomap.samples import as_number, as_row, as_whole
-from lemtomap.se2 import Pose
+from lemtomap.se2 import Pose, compose
 from lemtomap.topo.events import NavEvent
 from lemtomap.types import Scan, Twist
 
@@ -114,19 +115,28 @@ class ObstacleSighting:
     behind it, so its rays clear nothing on their way, only where they end on the floor."""
 
     @classmethod
-    def from_scan(cls, scan: Scan, T_odom_base: Pose, source: str = "laser") -> "ObstacleSighting":
-        """Read a scan: NaN and out-of-range values say nothing, +inf says free up to the range limit."""
+    def from_scan(
+        cls, scan: Scan, T_odom_base: Pose, source: str = "laser", T_base_beams: Pose = UNMOVED
+    ) -> "ObstacleSighting":
+        """Read a scan: NaN and out-of-range values say nothing, +inf says free up to the range limit.
+
+        T_base_beams: the motion during the scan, as deskew.motion_during tells it. The mapper's beams
+        (grid.beams) come out alike, but in float32, cut at a range of its own choice, with surfaces, and by a
+        kernel: its thread has no time to lose.
+        """
         ranges = np.asarray(scan.ranges_m, dtype=np.float64)
-        angles = scan.angle_min_rad + scan.angle_step_rad * np.arange(ranges.size) + scan.T_base_laser[2]
+        lasers = compose(T_base_beams, scan.T_base_laser) if len(T_base_beams) else scan.T_base_laser
+        angles = scan.angle_min_rad + scan.angle_step_rad * np.arange(ranges.size) + lasers[..., 2]
+        starts = np.broadcast_to(lasers[..., :2], (ranges.size, 2))
         hit = np.isfinite(ranges) & (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)
         miss = np.isposinf(ranges)
         directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        origin = np.asarray(scan.T_base_laser[:2], dtype=np.float64)
+        origin = scan.T_base_laser
         return cls(
             stamp_s=scan.stamp_s,
             T_odom_base=T_odom_base,
-            hits_base=origin + directions[hit] * ranges[hit, None],
-            misses_base=origin + directions[miss] * min(scan.range_max_m, scan.silent_free_m),
+            hits_base=starts[hit] + directions[hit] * ranges[hit, None],
+            misses_base=starts[miss] + directions[miss] * min(scan.range_max_m, scan.silent_free_m),
             origin_base=(float(origin[0]), float(origin[1])),
             source=source,
         )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.se2 import Pose, adjoint, inverse
-from lemtomap.types import EdgeType
+from lemtomap.types import EdgeType, RouteEdge
 
 Covariance = NDArray[np.float64]
 """float64 (3, 3): m, m, rad, symmetric and positive definite."""
@@ -167,6 +167,18 @@ class Mark:
     x_m: float
     y_m: float
     stamp_s: float
+
+
+def route_edge(edge: Edge, node_id: int) -> RouteEdge:
+    """Return what a planner needs of an edge, seen from one of its ends."""
+    return RouteEdge(
+        edge.edge_id,
+        edge.other(node_id),
+        edge.length_m,
+        edge.expected_time_s,
+        edge.blocked_until_s,
+        edge.is_proven,
+    )
 
 
 def detour(kind: EdgeType) -> float:

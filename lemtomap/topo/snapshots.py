@@ -1,14 +1,18 @@
 """What others see of the map: immutable views of the robot's neighbourhood in the window's frame."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lemtomap.topo.file.paging import PagedGraph
+from lemtomap.topo.graph import route_edge
 from lemtomap.topo.local import LocalMap
 from lemtomap.types import (
     EdgeType,
     GridView,
     MapView,
+    RouteEdge,
     SlamUpdate,
 )
 
@@ -21,6 +25,8 @@ class Snapshots:
         self._local = local
         self._key = (-1, -1)
         self._edges: list[tuple[int, int, int, EdgeType]] = []
+        self._changed_key: tuple[int, frozenset[int]] = (-1, frozenset())
+        self._changed_edges: Mapping[int, tuple[RouteEdge, ...]] = {}
 
     def take(
         self,
@@ -48,7 +54,20 @@ class Snapshots:
             lost=lost,
             particles=particles,
             names={node_id: name for name, node_id in names if node_id in poses},
+            changed=self.changed(),
+            graph_version=self._graph.store.version,
         )
+
+    def changed(self) -> Mapping[int, tuple[RouteEdge, ...]]:
+        """Return the edges of each node that changed since the file was written."""
+        key = (self._graph.store.version, self._graph.store.uncommitted)
+        if self._changed_key != key:
+            self._changed_key = key
+            self._changed_edges = {
+                node_id: tuple(route_edge(edge, node_id) for edge in self._graph.edges_of(node_id))
+                for node_id in sorted(key[1])
+            }
+        return self._changed_edges
 
     def _edges_at(self, associated_id: int) -> list[tuple[int, int, int, EdgeType]]:
         """Return (edge ID, source, target, type)."""

@@ -46,33 +46,6 @@ def contact_of(event: object) -> nav.Contact | None:
     return None
 
 
-def deskewed_sighting(scan: Scan, T_odom_base_beams: Pose) -> nav.ObstacleSighting:
-    """Return a scan's points in the base frame of its stamp, each moved by the motion until its beam.
-
-    T_odom_base_beams: float64 (N, 3), where the base was at each beam; the first one is the scan's own pose.
-    """
-    ranges = np.asarray(scan.ranges_m, dtype=np.float64)
-    hit = np.isfinite(ranges) & (ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)
-    miss = np.isposinf(ranges)
-    angles = scan.angle_min_rad + scan.angle_step_rad * np.arange(ranges.size)
-    T_base_beams = se2.between(T_odom_base_beams[0], T_odom_base_beams)
-    T_base_lasers = se2.compose(T_base_beams, scan.T_base_laser)
-
-    def ends(which: NDArray[np.bool_], length_m: NDArray[np.float64] | float) -> NDArray[np.float64]:
-        yaw = T_base_lasers[which, 2] + angles[which]
-        reach = np.stack([np.cos(yaw), np.sin(yaw)], axis=-1) * np.reshape(length_m, (-1, 1))
-        return np.asarray(T_base_lasers[which, :2] + reach)
-
-    origin = (float(scan.T_base_laser[0]), float(scan.T_base_laser[1]))
-    return nav.ObstacleSighting(
-        stamp_s=scan.stamp_s,
-        T_odom_base=T_odom_base_beams[0],
-        hits_base=ends(hit, ranges[hit]),
-        misses_base=ends(miss, min(scan.range_max_m, scan.silent_free_m)),
-        origin_base=origin,
-    )
-
-
 def scan_of(seen: LaserScan, T_base_laser: Pose, *, upside_down: bool = False) -> Scan:
     """Return a driver's scan as LEMTOMap takes it; the beams of a laser upside down turn clockwise."""
     way_round = -1.0 if upside_down else 1.0

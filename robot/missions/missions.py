@@ -8,6 +8,7 @@ from typing import Protocol
 from lemtomap.errors import BadSetting
 from lemtomap.nav.explore.explorer import Explorer
 from lemtomap.nav.navigator import Navigator
+from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.types import Goal, NavOutput, NavState
 from lemtomap.robot.exchange import MissionState
 from lemtomap.robot.missions.nodes_by_distance import farthest_node, nearest_of, ways_from
@@ -44,6 +45,11 @@ class MissionInput:
     """The node at which this run began."""
     docking: DockingOutput | None = None
     """How the drive onto the dock stands, once it has begun."""
+
+    @property
+    def fresh(self) -> FreshGraph:
+        """The graph with what mapping told last."""
+        return FreshGraph(self.graph, self.view)
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,14 +197,14 @@ class Tour:
         if here == self._here:
             return
         self._here = here
-        for way_m, node_id in ways_from(moment.graph, here):
+        for way_m, node_id in ways_from(moment.fresh, here):
             if way_m > self._spacing_m:
                 return
             self._seen.add(node_id)
 
     def _next(self, moment: MissionInput) -> int:
         """Return the nearest node not seen yet; the start when there is none."""
-        ways = ways_from(moment.graph, moment.view.associated_id)
+        ways = ways_from(moment.fresh, moment.view.associated_id)
         return next((node_id for _, node_id in ways if node_id not in self._seen), moment.start_id)
 
     def _text(self) -> str:
@@ -226,7 +232,7 @@ def resolve(place: str, moment: MissionInput) -> int | None:
     Of an area it is the node to which the way is shortest (thesis, section 3-5).
     """
     node_id = number(place)
-    if node_id is not None and moment.graph.has_node(node_id):
+    if node_id is not None and moment.fresh.has_node(node_id):
         return node_id
     named = moment.graph.node_of(place)
     if named is not None:
@@ -241,9 +247,9 @@ def _resolve_word(place: str, moment: MissionInput) -> int | None:
     if place == "here":
         return moment.view.associated_id
     if place == "start":
-        return moment.start_id if moment.graph.has_node(moment.start_id) else None
+        return moment.start_id if moment.fresh.has_node(moment.start_id) else None
     if place == "far":
-        return farthest_node(moment.graph, moment.view.associated_id)
+        return farthest_node(moment.fresh, moment.view.associated_id)
     return None
 
 

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from lemtomap.grid import DEFAULT_SLAM
 from lemtomap.grid.foreground import is_foreground
 from lemtomap.nav.kernels import shapes
-from lemtomap.nav.types import Contact, ContactKind, Goal
+from lemtomap.nav.types import Contact, ContactKind, Goal, ObstacleSighting
 from lemtomap.robot.build import build_core
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.core import RobotCore
-from lemtomap.robot.devices.bridge import deskewed_sighting
 from lemtomap.robot.exchange import TimedScan
 from lemtomap.robot.missions.missions import Explore
 from lemtomap.se2 import Pose, between
@@ -124,5 +123,5 @@ def _imagined_scan(T_world_base: Pose, before: Pose, now_s: float) -> TimedScan:
     scan = Scan(now_s, ranges, FIRST_RAD, 2.0 * np.pi / 1024, 1e-4)
     step = between(before, T_world_base)
     odometry = Odometry(now_s, T_world_base, float(step[0]) / SCAN_S, float(step[2]) / SCAN_S)
-    sighting = deskewed_sighting(scan, np.tile(T_world_base, (BEAMS, 1)))
+    sighting = ObstacleSighting.from_scan(scan, T_world_base)
     return TimedScan(scan, odometry, sighting, now_s, BEAMS)

@@ -170,9 +170,6 @@ def mapper(tmp_path):
         (([1.0, 2.0], ODOMETRY), r"Mapper.update: scan: must be of kind Scan, is \[1.0, 2.0\]"),
         ((ODOMETRY, SCAN), "Mapper.update: scan: must be of kind Scan, is Odometry"),
         ((SCAN, (0.0, 0.0, 0.0)), r"Mapper.update: odometry: must be of kind Odometry, is \(0.0"),
-        ((SCAN, ODOMETRY, [1.0, 2.0]), r"hits_base: must be points \(N, 2\), has shape \(2,\)"),
-        ((SCAN, ODOMETRY, np.ones((4, 3))), r"hits_base: must be points \(N, 2\), has shape \(4, 3\)"),
-        ((SCAN, ODOMETRY, "walls"), "hits_base: must be numbers, is 'walls'"),
     ],
 )
 def test_what_is_no_scan_no_odometry_or_no_points_does_not_reach_the_map(mapper, arguments, told):
@@ -180,11 +177,6 @@ def test_what_is_no_scan_no_odometry_or_no_points_does_not_reach_the_map(mapper,
         mapper.update(*arguments)
     with pytest.raises(lemtomap.NotStarted):
         mapper.view()
-
-
-@pytest.mark.parametrize("hits", [[], [[1.0, 0.5], [1.0, 0.6]], np.ones((3, 2), np.float32)])
-def test_points_may_come_as_lists_and_there_may_be_none(mapper, hits):
-    assert mapper.update(scan_at((0.0, 0.0, 0.0), WALLS), ODOMETRY, hits).used
 
 
 def test_points_that_fit_are_not_copied():
@@ -307,3 +299,17 @@ def test_a_navigator_is_not_opened_with_what_is_no_argument(given):
 def test_a_navigator_needs_a_map_that_is_there(tmp_path):
     with pytest.raises(lemtomap.BadMap, match=r"none\.lemto"):
         lemtomap.Navigator.open(tmp_path / "none.lemto")
+
+
+@pytest.mark.parametrize(
+    ("beams", "said"),
+    [
+        ([1.0, 2.0, 3.0], r"must be poses \(N, 3\), has shape \(3,\)"),
+        (np.ones((4, 2)), r"must be poses \(N, 3\), has shape \(4, 2\)"),
+        ([[0.0, 0.0, math.nan]], "must be finite"),
+        ("walls", "must be numbers, is 'walls'"),
+    ],
+)
+def test_the_odometry_of_each_beam_is_a_pose_each(beams, said):
+    with pytest.raises(lemtomap.BadSample, match=rf"Odometry\.T_odom_base_beams: {said}"):
+        lemtomap.Odometry(0.0, (0.0, 0.0, 0.0), T_odom_base_beams=beams)

@@ -110,9 +110,9 @@ def test_a_robot_carried_to_where_it_looks_different_says_so_at_once_and_is_foun
 
 
 @pytest.mark.parametrize("watched", [True, False])
-def test_wheels_that_leap_are_a_moved_robot_except_on_a_recorded_drive(building, watched):
+def test_wheels_that_leap_are_a_moved_robot_except_on_a_recorded_drive(tmp_path, watched):
     """Whoever carried the robot would have stopped the recording; a logger that lost messages did not."""
-    mapper = Mapper(lambda: WindowMatcher(SlamConfig()), building.topo, watched=watched)
+    mapper = Mapper.open(tmp_path / "leap.lemto", watched=watched)
     leap = np.zeros(3)
     displaced = []
     for k, (truth, odometry, scan) in enumerate(drive(LAPS[:80], WALLS, seed=2)):
@@ -123,11 +123,12 @@ def test_wheels_that_leap_are_a_moved_robot_except_on_a_recorded_drive(building,
         mapped = mapper.update(scan, told)
         displaced += [k] if mapped.displaced else []
         if k == 0:
-            start = between(building.topo.now[0].T_grid_base, truth)
+            start = between(mapper.topo.now[0].T_grid_base, truth)
     assert displaced == ([50] if watched else [])
     if not watched:
-        off = between(compose(building.topo.now[0].T_grid_base, start), truth)
+        off = between(compose(mapper.topo.now[0].T_grid_base, start), truth)
         assert np.hypot(off[0], off[1]) < 0.1
+    mapper.close()
 
 
 def test_a_robot_lifted_for_a_moment_goes_on_and_one_lifted_for_long_is_lost(building):

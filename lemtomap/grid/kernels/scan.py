@@ -20,20 +20,20 @@ def prepare_scan(
     ranges: Array,
     directions: Array,
     T_base_laser: Array,
-    motion: tuple[float, float, float],
+    T_base_beams: Array,
     limits: tuple[float, float, float],
     hits: Array,
     cuts: Array,
 ) -> tuple[int, int]:
     """Turn beams into points in base at the first beam's time; return (number of hits, number of cuts).
 
-    motion: v m/s, w rad/s, s between beams. limits: least range, usable range, and how far a beam that met
-    nothing (+inf) proves free space; a beam that goes beyond the usable range is cut there.
+    T_base_beams: float64 (N, 3), where the base was at each beam, or (0, 3) when it did not move.
+    limits: least range, usable range, and how far a beam that met nothing (+inf) proves free space; a beam
+    that goes beyond the usable range is cut there.
     directions, hits, cuts: (N, 2).
     """
     cos_l, sin_l = math.cos(T_base_laser[2]), math.sin(T_base_laser[2])
-    v, w, time_step = motion[0], motion[1], motion[2]
-    skewed = time_step != 0.0 and (v != 0.0 or w != 0.0)
+    skewed = T_base_beams.shape[0] > 0
     hit_count = cut_count = 0
     for i in range(ranges.shape[0]):
         r = ranges[i]
@@ -46,12 +46,8 @@ def prepare_scan(
         x = T_base_laser[0] + cos_l * lx - sin_l * ly
         y = T_base_laser[1] + sin_l * lx + cos_l * ly
         if skewed:
-            turn, way = w * time_step * i, v * time_step * i
-            c, s = math.cos(turn), math.sin(turn)
-            x, y = (
-                way * math.cos(0.5 * turn) + c * x - s * y,
-                way * math.sin(0.5 * turn) + s * x + c * y,
-            )
+            c, s = math.cos(T_base_beams[i, 2]), math.sin(T_base_beams[i, 2])
+            x, y = T_base_beams[i, 0] + c * x - s * y, T_base_beams[i, 1] + s * x + c * y
         if is_hit:
             hits[hit_count, 0], hits[hit_count, 1] = x, y
             hit_count += 1

@@ -113,7 +113,7 @@ class Explorer:
         T_grid_base = se2.compose(map_view.T_grid_odom, T_odom_base)
         reach = self._look(map_view, graph, T_grid_base, now_s)
         self._judge(navigation, now_s)
-        fresh = FreshGraph(graph, map_view, self._nav.route.usual_speed_mps)
+        fresh = FreshGraph(graph, map_view)
         goal = self._choose(Here(map_view, fresh, reach, T_grid_base, now_s))
         opened, _ = self._lists()
         self._empty_looks = 0 if opened else self._empty_looks + 1

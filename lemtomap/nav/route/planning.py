@@ -9,7 +9,7 @@ from lemtomap.nav.config import RouteConfig
 from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.route.network import RouteNetwork
 from lemtomap.nav.route.planner import Route, plan_route
-from lemtomap.types import EdgeTable, MapView, RouteGraph
+from lemtomap.types import EdgeTable, RouteEdge
 
 
 @runtime_checkable
@@ -45,20 +45,19 @@ class RoutePlanner:
 
     def plan(
         self,
-        graph: RouteGraph,
-        map_view: MapView,
+        graph: FreshGraph,
+        start_id: int,
         goal_id: int,
         now_s: float,
         closed_until_s: Mapping[int, float],
     ) -> Route:
-        """Return the cheapest open route from the associated node. Raises NoRoute with the reason."""
-        start_id = map_view.associated_id
-        fresh = FreshGraph(graph, map_view, self._config.usual_speed_mps)
-        if isinstance(graph, BulkGraph) and graph.node_count() >= self._config.large_nodes:
-            network = self._in_step(graph)
-            network.put(table_of(fresh.newborn_edges()))
+        """Return the cheapest open route. Raises NoRoute with the reason."""
+        stored = graph.stored
+        if isinstance(stored, BulkGraph) and stored.node_count() >= self._config.large_nodes:
+            network = self._in_step(stored)
+            network.renew(graph.changed, table_of(graph.changed))
             return network.plan(start_id, goal_id, now_s, closed_until_s)
-        return plan_route(fresh, start_id, goal_id, now_s, self._config, closed_until_s)
+        return plan_route(graph, start_id, goal_id, now_s, self._config, closed_until_s)
 
     def _in_step(self, graph: BulkGraph) -> RouteNetwork:
         """Return the flat copy, brought up to the graph's version."""
@@ -76,14 +75,16 @@ class RoutePlanner:
         return network
 
 
-def table_of(rows: Sequence[tuple[int, int, int, float, float, float]]) -> EdgeTable:
-    """Return the table of rows (edge id, source, target, length m, time s, blocked until s)."""
-    edge_id, source, target, length_m, time_s, blocked_s = zip(*rows, strict=True) if rows else ((),) * 6
+def table_of(edges_of: Mapping[int, Sequence[RouteEdge]]) -> EdgeTable:
+    """Return the edges at some nodes in columns, each once."""
+    found = {edge.edge_id: (node_id, edge) for node_id, edges in edges_of.items() for edge in edges}
+    edges = [edge for _, edge in found.values()]
     return EdgeTable(
-        np.array(edge_id, dtype=np.int64),
-        np.array(source, dtype=np.int64),
-        np.array(target, dtype=np.int64),
-        np.array(length_m, dtype=np.float32),
-        np.array(time_s, dtype=np.float32),
-        np.array(blocked_s, dtype=np.float64),
+        np.array(list(found), dtype=np.int64),
+        np.array([node_id for node_id, _ in found.values()], dtype=np.int64),
+        np.array([edge.other_id for edge in edges], dtype=np.int64),
+        np.array([edge.length_m for edge in edges], dtype=np.float32),
+        np.array([edge.time_s for edge in edges], dtype=np.float32),
+        np.array([edge.blocked_until_s for edge in edges], dtype=np.float64),
+        np.array([edge.proven for edge in edges], dtype=np.bool_),
     )

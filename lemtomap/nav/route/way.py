@@ -1,7 +1,7 @@
 """The route under way: planned, kept while it holds, and planned around edges that prove closed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from lemtomap.nav.config import NavConfig
 from lemtomap.nav.motion.metric import MetricPlan, Reach
 from lemtomap.nav.route.barriers import find_barrier, find_detour
 from lemtomap.nav.route.blocked import BlockedEdges
+from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.planning import RoutePlanner
 from lemtomap.nav.route.sliding import BORDER_M, SNAP_M, Target
@@ -37,7 +38,7 @@ class CycleInput:
     """What one control cycle knows."""
 
     map_view: MapView
-    graph: RouteGraph
+    graph: FreshGraph
     T_odom_base: Pose
     T_grid_base: Pose
     twist: Twist
@@ -102,10 +103,9 @@ class RouteKeeper:
         return False
 
     def _plan_from(self, node_id: int, goal: Goal, moment: CycleInput) -> Route:
-        view = replace(moment.map_view, associated_id=node_id)
         self._version = moment.graph.version
         closed_until_s = self.blocked.closed_until_s(moment.now_s)
-        return self._planner.plan(moment.graph, view, goal.node_id, moment.now_s, closed_until_s)
+        return self._planner.plan(moment.graph, node_id, goal.node_id, moment.now_s, closed_until_s)
 
     def check(
         self, goal: Goal, target: Target | None, plan: MetricPlan | None, reach: Reach, moment: CycleInput

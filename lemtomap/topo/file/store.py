@@ -69,6 +69,7 @@ class TopoStore:
         self._stamp_s: float | None = None
         self._next_node = self._next_id("node")
         self._next_edge = self._next_id("edge")
+        self._uncommitted: set[int] = set()
         self.version = int(self._one("SELECT coalesce(max(version), 0) FROM change"))
 
     @classmethod
@@ -178,6 +179,12 @@ class TopoStore:
                 if self._stamp_s is not None and self._blocked():
                     self.set_meta("stamp_s", self._stamp_s)
                 self._db.execute("COMMIT")
+            self._uncommitted.clear()
+
+    @property
+    def uncommitted(self) -> frozenset[int]:
+        """The nodes that are new, or whose edges changed, since readers of the file could last see them."""
+        return frozenset(self._uncommitted)
 
     def _blocked(self) -> list[tuple[int, float]]:
         """Return edges that are closed for a while, and until when."""
@@ -302,6 +309,7 @@ class TopoStore:
         node = Node(self._next_node, area_id, level, created_s)
         self._next_node += 1
         self._write(f"INSERT INTO node({NODE_COLUMNS}) VALUES(?, ?, ?, ?, ?, ?)", node_row(node))
+        self._uncommitted.add(node.node_id)
         return node
 
     def node(self, node_id: int) -> Node | None:
@@ -408,6 +416,7 @@ class TopoStore:
         self._changed(edge.source_id, edge.target_id)
 
     def _changed(self, *node_ids: int) -> None:
+        self._uncommitted.update(node_ids)
         for node_id in node_ids:
             self.version += 1
             self._write("INSERT INTO change(version, node) VALUES(?, ?)", (self.version, node_id))

@@ -8,6 +8,7 @@ import pytest
 
 from lemtomap.nav.config import NavConfig, RecoveryConfig
 from lemtomap.nav.navigator import Navigator
+from lemtomap.nav.route.fresh import FreshGraph
 from lemtomap.nav.route.planner import Route
 from lemtomap.nav.route.way import CycleInput, RouteKeeper
 from lemtomap.nav.types import (
@@ -62,9 +63,11 @@ def test_an_edge_found_cut_while_it_is_closed_is_not_closed_for_longer():
     spans_s = []
     world.graph.links = [(9, 1, 2)]
     for now_s in (0.0, 3.0, 6.0, 70.0, 400.0):
-        keeper.keep(Goal(1), CycleInput(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s))
+        view = world.view(1)
+        here = view, FreshGraph(world.graph, view), world.pose, world.pose, Twist(), now_s
+        keeper.keep(Goal(1), CycleInput(*here))
         keeper.route = Route((1, 2), (edge,), 2.5)
-        moment = CycleInput(world.view(1), world.graph, world.pose, world.pose, Twist(), now_s)
+        moment = CycleInput(*here)
         assert keeper.close_next(moment)
         spans_s += [event.until_s - now_s for event in moment.events if isinstance(event, EdgeBlocked)]
         if now_s == 70.0:

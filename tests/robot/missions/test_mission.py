@@ -33,7 +33,8 @@ class Line:
 
 def moment(state, cycle, here=3, text=""):
     output = NavOutput(0.1 * cycle, Twist(), state, text=text, cycle=cycle)
-    return MissionInput(0.1 * cycle, SimpleNamespace(associated_id=here), Line(), output, None, None)
+    view = SimpleNamespace(associated_id=here, changed={}, graph_version=0)
+    return MissionInput(0.1 * cycle, view, Line(), output, None, None)
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,9 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from lemtomap.nav.types import ObstacleSighting
 from lemtomap.robot.child import python
-from lemtomap.robot.devices.bridge import URG_SILENT_FREE_M, deskewed_sighting
+from lemtomap.robot.devices.bridge import URG_SILENT_FREE_M
 from lemtomap.robot.logs import open_log
 from lemtomap.types import Odometry, Scan
 from tools.bench.thesis_parts.frames import (
@@ -108,5 +107,5 @@ def _frames(scans: Any) -> Iterator[Frame]:
     for odometry, scan in scans:
         start_s = scan.stamp_s if start_s is None else start_s
         seen = replace(scan, silent_free_m=URG_SILENT_FREE_M)  # as on the robot
-        beams = np.repeat(odometry.T_odom_base[None, :], len(scan.ranges_m), axis=0)
-        yield Frame(scan.stamp_s - start_s, odometry, seen, deskewed_sighting(seen, beams))
+        sighting = ObstacleSighting.from_scan(seen, odometry.T_odom_base)
+        yield Frame(scan.stamp_s - start_s, odometry, seen, sighting)

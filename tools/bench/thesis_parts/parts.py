@@ -123,7 +123,6 @@ class TopologicalMapping(Part):
         frame.view = self._mapper.view()
         if frame.view.associated_id != self._node_id:
             self._node_id = frame.node_id = frame.view.associated_id
-            self._mapper.store.commit()
 
     def finish(self) -> dict[str, Any]:
         """Lay the map out for the picture, close the file and tell its size."""
