@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lemtomap import se2
+from lemtomap.nav.types import ObstacleSighting
 from lemtomap.pipeline import Mapper
 from lemtomap.robot.config import RobotConfig
 from lemtomap.robot.devices import bridge
@@ -65,8 +66,7 @@ def test_every_beam_ends_where_it_was_reflected(kind):
         scan = bridge.scan_of(
             seen_by(laser, T_world_base), laser.T_base_laser, upside_down=laser.is_upside_down
         )
-        here = np.tile(T_world_base, (len(scan.ranges_m), 1))
-        sighting = bridge.deskewed_sighting(scan, here)
+        sighting = ObstacleSighting.from_scan(scan, np.array(T_world_base))
         ends = se2.transform(np.array(T_world_base), sighting.hits_base)
         assert len(ends) > 100
         assert off_walls_m(ends).max() < 1e-4
