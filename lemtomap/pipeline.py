@@ -109,7 +109,7 @@ class Mapper:
         """Use one scan; odometry is the base at the scan's stamp, and at each beam where that is known.
 
         lifted: the wheels hang in the air; events: what navigation found out since the scan before.
-        Raises BadSample for what is no scan, no odometry or no points, and a pose that is not finite.
+        Raises BadSample for what is no scan or no odometry, and a pose that is not finite.
         """
         check_kind("Mapper.update: scan", scan, Scan)
         check_kind("Mapper.update: odometry", odometry, Odometry)

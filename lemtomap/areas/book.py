@@ -5,7 +5,7 @@ row keeps what no node can tell: its name and kind, the IDs that merged into it,
 """
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -185,12 +185,3 @@ class AreaBook:
             found += self._store.query("SELECT coalesce(max(area), 0) FROM node")
         highest = max(int(number) for (number,) in found)
         return max(highest + 1, int(self._store.meta(f"next_{table}") or 1))
-
-
-def of_store(store: TopoStore) -> Iterator[tuple[Area, list[int]]]:
-    """Iterate over the areas that have nodes, each with their IDs."""
-    book = AreaBook(store)
-    for area in book.areas():
-        nodes = book.nodes_of(area.area_id)
-        if nodes:
-            yield area, nodes

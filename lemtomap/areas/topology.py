@@ -99,10 +99,3 @@ def area_meant(store: TopoStore, text: str) -> int | None:
         area = AreaBook(store).area(int(number))
         return None if area is None else area.area_id
     return AreaBook(store).names().get(text)
-
-
-def nodes_meant(store: TopoStore, text: str) -> list[int]:
-    """Return the nodes of the area meant by `area:7` or a name; empty when there is none."""
-    names = AreaBook(store).names()
-    area_id = area_meant(store, text) if text.startswith("area:") or text in names else None
-    return AreaBook(store).nodes_of(area_id) if area_id is not None else []

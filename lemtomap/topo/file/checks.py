@@ -89,6 +89,14 @@ META = Kind(
     "no number, or too long",
 )
 SPLIT = Kind("typeof({0}) = 'integer' AND {0} > id", "no split further down")
+PASSAGE = {
+    "node": COUNT,  # whose node may have gone since
+    "x": METRES,
+    "y": METRES,
+    "yaw": _real(-MOST_YAW_RAD, MOST_YAW_RAD),
+    "width": _real(0.0, MOST_LENGTH_M),
+}
+"""Of a door or an opening: the node in whose frame it lies, where, and how wide it is."""
 COLUMNS: dict[str, dict[str, Kind]] = {
     "node": {
         "id": ID,
@@ -116,11 +124,7 @@ COLUMNS: dict[str, dict[str, Kind]] = {
     "area": {"id": ID, "name": _or_none(TEXT), "kind": _or_none(TEXT), "tags": _or_none(JSON)},
     "door": {
         "id": ID,
-        "node": COUNT,  # whose node may have gone since
-        "x": METRES,
-        "y": METRES,
-        "yaw": _real(-MOST_YAW_RAD, MOST_YAW_RAD),
-        "width": _real(0.0, MOST_LENGTH_M),
+        **PASSAGE,
         "seen_open": COUNT,
         "seen_shut": COUNT,
         "last_open": _or_none(STAMP),
@@ -131,11 +135,7 @@ COLUMNS: dict[str, dict[str, Kind]] = {
     "door_edge": {"edge": ID, "door": ID},
     "placeholder": {
         "id": COUNT,
-        "node": COUNT,  # whose node may have gone since
-        "x": METRES,
-        "y": METRES,
-        "yaw": _real(-MOST_YAW_RAD, MOST_YAW_RAD),
-        "width": _real(0.0, MOST_LENGTH_M),
+        **PASSAGE,
         "state": _one_of([str(state) for state in OpeningState]),
     },
     "ground": {"node": ID, "picture": BLOB},
